@@ -7,9 +7,12 @@ reward profile), not with robots or arcs.
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
 
 from react_opt.instance import OrosInstance
-from react_opt.solvers.routes.problem import FloatArray, IntArray, RobotClass, RouteProblem
+from react_opt.route_problem import FloatArray, IntArray, RobotClass, RouteProblem
 
 
 def route_problem(instance: OrosInstance) -> RouteProblem:
@@ -65,9 +68,7 @@ def reward_profile(instance: OrosInstance) -> FloatArray:
     """
     horizon = instance.horizon_steps
     instant = np.arange(horizon + 1)
-    deadline = np.array(
-        [horizon if c.deadline_step is None else min(c.deadline_step, horizon) for c in instance.cells]
-    )
+    deadline = np.array([horizon if c.deadline_step is None else min(c.deadline_step, horizon) for c in instance.cells])
     weight = np.array([0.0 if cell.explored else cell.weight for cell in instance.cells])
     profile = weight[:, None] * np.maximum(deadline[:, None] - instant[None, :] + 1, 0)
     profile[:, 0] = 0.0
@@ -110,3 +111,46 @@ def _classes(instance: OrosInstance, cell_index: dict[str, int]) -> tuple[RobotC
         )
         groups.setdefault(key, []).append(index)
     return tuple(RobotClass(tuple(robots), *key) for key, robots in groups.items())
+
+
+def steps_between(problem: RouteProblem, origin: int, *, backward: bool = False) -> IntArray:
+    """Return the fewest steps from a cell to every cell (``backward``: from every cell to it).
+
+    Cells that cannot be reached have ``horizon + 1``.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    origin
+        Index of the cell.
+    """
+    n = problem.n_cells
+    tail, head = (problem.arc_to, problem.arc_from) if backward else (problem.arc_from, problem.arc_to)
+    order = np.lexsort((problem.arc_steps, head, tail))  # of parallel arcs the fastest comes first
+    first = np.unique(tail[order] * n + head[order], return_index=True)[1]
+    fastest = order[first]
+    graph = sp.csr_array((problem.arc_steps[fastest].astype(np.float64), (tail[fastest], head[fastest])), shape=(n, n))
+    distance = dijkstra(graph, indices=origin)
+    return np.where(distance <= problem.horizon, distance, problem.horizon + 1).astype(np.int64)
+
+
+def reach(problem: RouteProblem, group: RobotClass) -> NDArray[np.bool_]:
+    """Return ``(n_cells, T + 1)``: where and when a robot can stand, by its motion alone.
+
+    It must have had the steps to come from its start, and keep those to its ``return_to``. The node of its
+    start is always True.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    group
+        The robot's class.
+    """
+    instant = np.arange(problem.horizon + 1)[None, :]
+    stand = instant >= group.start_step + steps_between(problem, group.start)[:, None]
+    if group.return_to >= 0:
+        stand &= instant + steps_between(problem, group.return_to, backward=True)[:, None] <= problem.horizon
+    stand[group.start, group.start_step] = True
+    return np.asarray(stand)
