@@ -28,6 +28,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from react_opt.errors import UsageError
 from react_opt.kernels import kernel
 
 FloatArray = NDArray[np.float64]
@@ -53,6 +54,11 @@ class RobotProfile:
         Battery at the start, when full, and the charge never to go below, J.
     lidar_range_m, lidar_rays
         Reach of its LiDAR, m, and rays per turn.
+
+    Raises
+    ------
+    UsageError
+        Where a robot could not move or turn at all.
     """
 
     length_m: float
@@ -71,6 +77,14 @@ class RobotProfile:
     reserve_j: float
     lidar_range_m: float
     lidar_rays: int
+
+    def __post_init__(self) -> None:
+        if not 0 < self.speed_min_m_s <= self.speed_max_m_s:
+            raise UsageError(
+                f"speeds are 0 < speed_min_m_s <= speed_max_m_s, not {self.speed_min_m_s} and {self.speed_max_m_s}"
+            )
+        if not self.turn_rad_s > 0:
+            raise UsageError(f"turn_rad_s is positive, not {self.turn_rad_s}")
 
     @property
     def radius_m(self) -> float:

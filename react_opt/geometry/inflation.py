@@ -19,6 +19,9 @@ from react_opt.kernels import kernel
 UnknownSpace = Literal["blocked", "free", "costlier"]
 """How unknown pixels count: as walls, as free space, or as free space where the robot drives more slowly."""
 
+Rule = Literal["strict", "centres"]
+"""Which pixels are free: see :func:`inflate`."""
+
 _ROUNDING = 1e-9  # of a pixel; a clearance that equals the radius but for rounding is enough
 
 
@@ -53,9 +56,9 @@ class Footprint:
 class FreeSpace:
     """The points where a footprint's centre may be, as an inflated pixel map (made by :func:`inflate`).
 
-    A pixel is free when *every* point of it is at least the footprint's radius away from everything that
-    blocks, so a path through free pixels is free of collision without any tolerance. The pixels may be finer
-    than the map's (``refine``), since that cover costs up to one pixel at each wall.
+    By the strict rule a pixel is free when *every* point of it is at least the footprint's radius away from
+    everything that blocks, so a path through free pixels is free of collision without any tolerance. The pixels
+    may be finer than the map's (``refine``), since that cover costs up to one pixel at each wall.
 
     Parameters
     ----------
@@ -67,6 +70,8 @@ class FreeSpace:
         How unknown pixels count.
     unknown_speed_factor
         Share of the speed that is left in unknown pixels, in (0, 1]; 1 unless ``unknown`` is ``costlier``.
+    rule
+        Which pixels are free.
     refine
         Pixels here per pixel of the map, along one side.
     padded
@@ -82,6 +87,7 @@ class FreeSpace:
     footprint: Footprint
     unknown: UnknownSpace
     unknown_speed_factor: float
+    rule: Rule
     refine: int
     padded: NDArray[np.uint8]
     clearance_m: NDArray[np.float32]
@@ -185,6 +191,7 @@ def inflate(
     *,
     unknown: UnknownSpace = "blocked",
     unknown_speed_factor: float = 0.5,
+    rule: Rule = "strict",
     refine: int | None = None,
 ) -> FreeSpace:
     """Inflate a map by a footprint.
@@ -200,9 +207,15 @@ def inflate(
         Unknown pixels are ``blocked``, ``free``, or ``costlier``: free, at a share of the speed.
     unknown_speed_factor
         That share, in (0, 1].
+    rule
+        ``strict``: a pixel is free when every point of it keeps the radius from every blocked pixel's square.
+        ``centres``: when its centre keeps the radius from every blocked pixel's centre, as ROS costmaps have
+        it; this opens passages up to a pixel narrower than the footprint, and the footprint may cut into a
+        blocked pixel by up to 1.2 pixels.
     refine
-        Pixels per pixel of the map along one side, 1 to 8. By default as many as bring a pixel below a quarter
-        of the radius, at most 4 and only while the refined map stays below 16 million pixels.
+        Pixels per pixel of the map along one side, 1 to 8. By default 1 for ``centres``; for ``strict`` as many
+        as bring a pixel below a quarter of the radius, at most 4 and only while the refined map stays below
+        16 million pixels.
 
     Raises
     ------
@@ -220,23 +233,29 @@ def inflate(
         raise UsageError(f"unknown space is blocked, free or costlier, not {unknown!r}")
     if not 0 < unknown_speed_factor <= 1:
         raise UsageError(f"the speed factor of unknown space lies in (0, 1], not {unknown_speed_factor}")
+    if rule not in ("strict", "centres"):
+        raise UsageError(f"the rule of inflation is strict or centres, not {rule!r}")
     if refine is None:
-        refine = _default_refinement(source, footprint)
+        refine = _default_refinement(source, footprint) if rule == "strict" else 1
     if not 1 <= refine <= 8:
         raise UsageError(f"refine is 1 to 8, not {refine}")
     if source.cells.size * refine**2 > MAX_PIXELS:
         raise UsageError(f"a map of {source.cells.size} pixels refined {refine} times is too large")
     cells = np.repeat(np.repeat(source.cells, refine, axis=0), refine, axis=1) if refine > 1 else source.cells
     solid = cells != FREE if unknown == "blocked" else cells == OCCUPIED
-    clearance = _corner_clearance(solid, outside=unknown == "blocked") * (source.resolution_m / refine)
-    lowest = np.minimum(clearance[:-1], clearance[1:])
-    lowest = np.minimum(lowest[:, :-1], lowest[:, 1:])
+    pixel_m = source.resolution_m / refine
+    outside = unknown == "blocked"
+    clearance = _corner_clearance(solid, outside) * pixel_m
+    if rule == "strict":
+        nearest = np.minimum(clearance[:-1], clearance[1:])
+        nearest = np.minimum(nearest[:, :-1], nearest[:, 1:])
+    else:
+        nearest = _distances(np.pad(solid, 1, constant_values=outside))[1:-1, 1:-1] * pixel_m
     padded = np.ones((cells.shape[0] + 2, cells.shape[1] + 2), dtype=np.uint8)
-    enough = footprint.radius_m - _ROUNDING * source.resolution_m
-    padded[1:-1, 1:-1] = (lowest < enough) | solid
+    padded[1:-1, 1:-1] = (nearest < footprint.radius_m - _ROUNDING * pixel_m) | solid
     slow = np.asarray((cells == UNKNOWN) & (unknown == "costlier"), dtype=np.uint8)
     factor = unknown_speed_factor if unknown == "costlier" else 1.0
-    return FreeSpace(source, footprint, unknown, factor, refine, padded, clearance.astype(np.float32), slow)
+    return FreeSpace(source, footprint, unknown, factor, rule, refine, padded, clearance.astype(np.float32), slow)
 
 
 def _default_refinement(source: OccupancyMap, footprint: Footprint) -> int:
@@ -256,9 +275,14 @@ def _corner_clearance(solid: NDArray[np.bool_], outside: bool) -> FloatArray:
     """
     around = np.pad(solid, 1, constant_values=outside)
     touches = around[:-1, :-1] | around[:-1, 1:] | around[1:, :-1] | around[1:, 1:]
-    if not touches.any():
-        return np.full(touches.shape, float(np.hypot(*touches.shape)))  # finite: the map's diagonal
-    return np.asarray(ndimage.distance_transform_edt(~touches), dtype=np.float64)
+    return _distances(touches)
+
+
+def _distances(marked: NDArray[np.bool_]) -> FloatArray:
+    """Return the distance of every element to the nearest marked one; the diagonal without any (finite)."""
+    if not marked.any():
+        return np.full(marked.shape, float(np.hypot(*marked.shape)))
+    return np.asarray(ndimage.distance_transform_edt(~marked), dtype=np.float64)
 
 
 def _rows_of_two(pixels: FloatArray) -> FloatArray:
