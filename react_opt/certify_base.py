@@ -82,6 +82,14 @@ def agree(found: float, expected: float) -> bool:
     return found == expected or abs(found - expected) <= slack(found, expected)
 
 
+def agree_value(found: float, expected: float) -> bool:
+    """Return whether two values of an objective are the same.
+
+    Weights come in any unit, so this is relative: 1e-9 of the larger, and 1e-9 around zero.
+    """
+    return math.isclose(found, expected, rel_tol=RELATIVE, abs_tol=RELATIVE)
+
+
 def slack(*values: float) -> float:
     """Return the tolerance for numbers of this size: ``ABSOLUTE + RELATIVE * max |value|``."""
     return ABSOLUTE + RELATIVE * max(abs(value) for value in values)
@@ -96,14 +104,6 @@ def shown(value: object) -> str:
     except ValueError:  # Python refuses to print integers of thousands of digits
         return "a huge number"
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def as_float(value: int) -> float:
-    """Return a whole number as a float, infinite where it is too large for one."""
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
 
 
 def instance_rule(instance: Document, plan: PlanDocument) -> Iterator[Violation]:
@@ -153,7 +153,7 @@ def claim_rule(claim: Claim, objective: float | None, optimal_gap: float, empty:
             yield broken(None, f"status {claim.status} goes with a plan, found none")
         if claim.objective is None:
             yield broken(None, f"status {claim.status} goes with an objective, found none")
-    if claim.objective is not None and objective is not None and not agree(claim.objective, objective):
+    if claim.objective is not None and objective is not None and not agree_value(claim.objective, objective):
         off = claim.objective - objective
         yield broken(off, f"objective: expected {shown(objective)}, found {shown(claim.objective)}")
     yield from _gap_rule(claim)
