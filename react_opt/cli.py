@@ -1,0 +1,227 @@
+"""The command line: ``react-opt build | solve | check | schema | solvers``."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import click
+import typer
+from rich.console import Console
+
+from react_opt.errors import InputError, MissingPartError, ReactError, UsageError
+from react_opt.interrupt import Interruption
+
+OK, VIOLATED, BAD_INPUT, INFEASIBLE, NO_PLAN, INTERRUPTED = 0, 1, 2, 3, 4, 130
+
+app = typer.Typer(
+    name="react-opt",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Plan how battery-powered robots explore a building against the clock, with a proof of how good the plan is.",
+)
+
+Output = Annotated[str | None, typer.Option("-o", "--output", help="File to write, - for standard output.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result itself instead of a table.")]
+
+
+def main() -> NoReturn:
+    """Run the command line; every expected failure is one line on standard error and an exit code."""
+    try:
+        code = app(standalone_mode=False)
+        sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.format_message(), file=sys.stderr)
+        code = BAD_INPUT
+    except click.ClickException as error:
+        where = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "react-opt"
+        print(f"{where}: {error.format_message()}", file=sys.stderr)
+        code = BAD_INPUT
+    except (InputError, UsageError, MissingPartError) as error:
+        print(error, file=sys.stderr)
+        code = BAD_INPUT
+    except ReactError as error:
+        print(f"react-opt: {error}", file=sys.stderr)
+        code = NO_PLAN
+    except (KeyboardInterrupt, click.Abort):
+        print("interrupted", file=sys.stderr)
+        code = INTERRUPTED
+    except MemoryError:
+        print("react-opt: out of memory; nothing was written", file=sys.stderr)
+        code = NO_PLAN
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = OK
+    sys.exit(code if isinstance(code, int) else OK)
+
+
+@app.command()
+def build(
+    map_file: Annotated[str, typer.Argument(metavar="MAP", help="ROS map YAML, or MovingAI .map.")],
+    fleet: Annotated[str, typer.Option("--fleet", help="Fleet file (JSON).")],
+    cell_m: Annotated[float, typer.Option("--cell-m", help="Side of a cell, m.")] = 10.0,
+    horizon_s: Annotated[float, typer.Option("--horizon-s", help="Time to plan for, s.")] = 240.0,
+    step_s: Annotated[float, typer.Option("--step-s", help="Length of a step, s.")] = 10.0,
+    paths: Annotated[str, typer.Option("--paths", help="Path costs: exact or ompl.")] = "exact",
+    output: Output = None,
+    as_json: AsJson = False,
+) -> int:
+    """Build an oros instance from a map and a fleet.
+
+    Example: react-opt build factory.yaml --fleet fleet.json --cell-m 10 --horizon-s 240 --step-s 10 -o factory.json
+    """
+    from react_opt.build import build as build_instance
+    from react_opt.geometry import load_map
+    from react_opt.jsonio import dumps, load, save
+    from react_opt.report.tables import build_table
+
+    report = build_instance(
+        load_map(map_file), load(fleet, "fleet"), cell_m=cell_m, horizon_s=horizon_s, step_s=step_s, paths=paths
+    )
+    if output is not None:
+        save(report.instance, output)
+    if as_json and output != "-":
+        sys.stdout.write(dumps(report.instance))
+    elif output != "-":
+        Console().print(build_table(report))
+    for what, place, why in report.dropped:
+        print(f"dropped: {what} {place}: {why}", file=sys.stderr)
+    return OK
+
+
+@app.command()
+def solve(
+    instance_file: Annotated[
+        str, typer.Argument(metavar="INSTANCE", help="Instance file (JSON), - for standard input.")
+    ],
+    output: Output = None,
+    as_json: AsJson = False,
+    solver: Annotated[str | None, typer.Option("--solver", help="Backend, see react-opt solvers.")] = None,
+    method: Annotated[str, typer.Option("--method", help="auto, monolith or routes.")] = "auto",
+    time_limit: Annotated[float, typer.Option("--time-limit", help="Seconds from call to answer.")] = 60.0,
+    work_limit: Annotated[int | None, typer.Option("--work-limit", help="Counted work, for reproducible runs.")] = None,
+    gap: Annotated[float | None, typer.Option("--gap", help="Stop at this gap (a fraction).")] = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Threads, all cores by default.")] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of everything random.")] = 0,
+    start: Annotated[str | None, typer.Option("--start", help="Plan to start from: never worse than it.")] = None,
+    at_step: Annotated[int | None, typer.Option("--at-step", help="Keep the first K steps of that plan.")] = None,
+) -> int:
+    """Solve an oros, assignment or inspection instance.
+
+    Exit codes: 0 a plan, 2 bad input, 3 proven that no plan exists, 4 no plan found in time, 130 interrupted.
+
+    Example: react-opt solve factory.json --time-limit 10 -o plan.json
+    """
+    from react_opt.jsonio import dumps, load, save
+    from react_opt.planner import solve as solve_instance
+    from react_opt.report.live import live_line
+    from react_opt.report.tables import plan_table
+
+    if instance_file == start == "-":
+        raise UsageError("--start: standard input is the instance already")
+    instance = _instance(load(instance_file), instance_file)
+    given = None if start is None else load(start)
+    with Interruption() as interruption, live_line() as progress:
+        plan = solve_instance(
+            instance,
+            time_limit_s=time_limit,
+            work_limit=work_limit,
+            gap=gap,
+            solver=solver,
+            method=method,
+            threads=threads,
+            seed=seed,
+            start=given,
+            at_step=at_step,
+            on_progress=progress,
+            should_stop=interruption.asked,
+        )
+    if output is not None:
+        save(plan, output)
+    if as_json and output != "-":
+        sys.stdout.write(dumps(plan))
+    elif output != "-":
+        Console().print(plan_table(instance, plan))
+    if plan.claim.reason:
+        print(f"{instance_file}: {plan.claim.reason}", file=sys.stderr)
+    if interruption.asked():
+        return INTERRUPTED
+    return {"optimal": OK, "feasible": OK, "infeasible": INFEASIBLE, "no_plan": NO_PLAN}[plan.claim.status]
+
+
+@app.command()
+def check(
+    instance_file: Annotated[str, typer.Argument(metavar="INSTANCE", help="Instance file (JSON).")],
+    plan_file: Annotated[str, typer.Argument(metavar="PLAN", help="Plan file (JSON).")],
+    bound: Annotated[bool, typer.Option("--bound", help="Recompute the bound from the certificate.")] = False,
+) -> int:
+    """Replay a plan without any solver and print each rule that it breaks.
+
+    Exit codes: 0 the plan is right, 1 it breaks a rule (or belongs to another instance), 2 bad input.
+
+    Example: react-opt check factory.json plan.json
+    """
+    from react_opt.certify import check as check_plan
+    from react_opt.jsonio import load
+
+    if instance_file == plan_file == "-":
+        raise UsageError("PLAN: standard input is the instance already")
+    instance = _instance(load(instance_file), instance_file)
+    plan = load(plan_file)
+    if not plan.kind.endswith("_plan"):
+        raise InputError.single(plan_file, "kind", f"expected a plan, found {plan.kind!r}")
+    certificate = check_plan(instance, plan, bound=bound)
+    for violation in certificate.violations:
+        print(f"{plan_file}: {violation}")
+    if certificate.ok:
+        print(f"{plan_file}: {_verdict(plan, certificate, bound)}")
+    return OK if certificate.ok else VIOLATED
+
+
+@app.command()
+def schema(kind: Annotated[str, typer.Argument(metavar="KIND", help="For instance oros or oros_plan.")]) -> int:
+    """Print the JSON Schema of a kind of file.
+
+    Example: react-opt schema oros > oros.schema.json
+    """
+    from react_opt.jsonio import json_schema
+
+    print(json.dumps(json_schema(kind), indent=2))
+    return OK
+
+
+@app.command()
+def solvers() -> int:
+    """List the solvers that are installed, with versions and what each can do."""
+    from react_opt.report.tables import solvers_table
+
+    Console().print(solvers_table())
+    return OK
+
+
+def _instance(document: Any, file: str) -> Any:
+    if document.kind == "mission":
+        raise InputError.single(file, "kind", "a mission is simulated, not solved: use react-opt simulate")
+    if document.kind not in ("oros", "assignment", "inspection"):
+        expected = "expected an oros, assignment or inspection instance"
+        raise InputError.single(file, "kind", f"{expected}, found {document.kind!r}")
+    return document
+
+
+def _verdict(plan: Any, certificate: Any, bound: bool) -> str:
+    claim = plan.claim
+    if claim.objective is None:
+        return f"ok: claims {claim.status}"
+    text = f"ok: {claim.status}, objective {claim.objective:.9g}"
+    if bound:
+        return f"{text}, bound recomputed {certificate.bound:.9g} (claimed {claim.bound:.9g})"
+    return text if claim.bound is None else f"{text}, claimed bound {claim.bound:.9g}"
+
+
+if __name__ == "__main__":
+    sys.argv[0] = Path(sys.argv[0]).name
+    main()

@@ -1,0 +1,276 @@
+"""The OROS recipe: a greedy plan first, then the method that fits, then the replay by the checker."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from react_opt.certify import check
+from react_opt.claims import instance_ref, optimality_tolerance, relaxation_bound, versions
+from react_opt.errors import InputError, ReactError, UsageError
+from react_opt.instance import OrosInstance
+from react_opt.models.oros import column_count
+from react_opt.models.readback import explored_value, fill_plan, routes_of, tidy, value
+from react_opt.options import SolveOptions
+from react_opt.plan import Claim, OrosPlan, Plan, gap_of
+from react_opt.replan import Frozen, freeze
+from react_opt.route_problem import Route, RouteProblem
+from react_opt.solvers.monolith import solve_monolith
+from react_opt.solvers.outcome import Request
+from react_opt.solvers.routes.greedy import InfeasibleRobot, greedy
+from react_opt.timegraph import route_problem
+
+MAX_ENTRIES = 150_000_000  # cells x steps of the reward profile: about 5 GB while it is built
+MAX_PLAN_STEPS = 5_000_000  # rows of a plan file
+MAX_COLUMNS = 4_000_000  # of the monolith
+
+
+@dataclass
+class Search:
+    """What is known while an instance is being solved.
+
+    ``candidates`` are (value, routes), routes class by class; ``bound`` is proven; both without ``constant``,
+    what cells explored from the start earn.
+    """
+
+    instance: OrosInstance
+    options: SolveOptions
+    problem: RouteProblem
+    constant: float
+    bound: float
+    frozen: Frozen | None = None
+    at_step: int | None = None
+    candidates: list[tuple[float, list[Route]]] = field(default_factory=list)
+    limit: str = "none"
+    infeasible: str | None = None
+    method: str = ""
+    solver: str = ""
+    packages: tuple[str, ...] = ("numpy", "scipy", "numba")
+    settings: dict[str, Any] = field(default_factory=dict)
+    certificate: dict[str, Any] | None = None
+    wall_s: dict[str, float] = field(default_factory=dict)
+
+    def offer(self, routes: Sequence[Route]) -> None:
+        """Add routes of the whole problem as a candidate."""
+        kept = tidy(self.problem, routes)
+        self.candidates.append((value(self.problem, kept), kept))
+
+    @property
+    def best(self) -> tuple[float, list[Route]] | None:
+        """The best candidate; of equals the first."""
+        return max(self.candidates, key=lambda candidate: candidate[0], default=None)
+
+    def progress(self, elapsed_s: float, incumbent: float | None, bound: float | None) -> None:
+        """Report in the instance's own objective, never worse than what is known."""
+        if self.options.on_progress is None:
+            return
+        known = self.best
+        values = [v for v in (incumbent, known[0] + self.constant if known else None) if v is not None]
+        bounds = [v for v in (bound, self.bound + self.constant) if v is not None]
+        elapsed_s = time.perf_counter() - self.options.begun
+        self.options.on_progress(elapsed_s, max(values, default=None), min(bounds))
+
+
+def solve_oros(instance: OrosInstance, options: SolveOptions, start: Plan | None, at_step: int | None) -> OrosPlan:
+    """Solve an ``oros`` instance; see :func:`react_opt.solve`."""
+    entries = len(instance.cells) * (instance.horizon_steps + 1)
+    rows = sum(instance.horizon_steps + 1 - robot.start_step for robot in instance.robots)
+    if entries > MAX_ENTRIES or rows > MAX_PLAN_STEPS:
+        reason = f"memory: {entries} cells x steps (at most {MAX_ENTRIES}), {rows} plan rows (at most {MAX_PLAN_STEPS})"
+        return _without_plan(instance, options, Claim(status="no_plan", limit="memory", reason=reason))
+    search = _begin(instance, options, start, at_step)
+    search.wall_s["build"] = time.perf_counter() - options.begun
+    _timed(search, "greedy", _greedy)
+    if search.infeasible is None and not _proven(search):
+        _timed(search, "solve", _choose(search))
+    return _finish(search)
+
+
+def _begin(instance: OrosInstance, options: SolveOptions, start: Plan | None, at_step: int | None) -> Search:
+    problem = route_problem(instance)
+    search = Search(instance, options, problem, explored_value(instance), relaxation_bound(problem))
+    if start is None:
+        return search
+    if not isinstance(start, OrosPlan):
+        raise InputError.single("<start>", "kind", f"expected an oros_plan, found {start.kind!r}")
+    found = check(instance, start)
+    if not found.ok:
+        raise InputError.single("<start>", "", f"expected a valid plan of this instance: {found.violations[0]}")
+    if not start.robots and instance.robots:
+        raise InputError.single("<start>", "robots", "expected a plan to start from, found none")
+    routes = routes_of(instance, problem, start)
+    search.offer(routes)
+    if at_step is not None:
+        if not 0 <= at_step <= instance.horizon_steps:
+            raise UsageError(f"at step: expected 0 to {instance.horizon_steps}, found {at_step}")
+        search.at_step = at_step
+        search.frozen = freeze(problem, routes, at_step)
+        search.bound = search.frozen.earned + relaxation_bound(search.frozen.problem)
+    return search
+
+
+def _timed(search: Search, phase: str, work: Any) -> None:
+    begun = time.perf_counter()
+    work(search)
+    search.wall_s[phase] = search.wall_s.get(phase, 0.0) + time.perf_counter() - begun
+
+
+def _greedy(search: Search) -> None:
+    """Put a plan in hand before any solver starts."""
+    if search.candidates:
+        return
+    found = greedy(search.problem, seed=search.options.seed)
+    if isinstance(found.reason, InfeasibleRobot):
+        robot = search.instance.robots[found.reason.robot].id
+        search.infeasible = f"robot {robot}: {found.reason.rule}: {found.reason.text}"
+        search.method = "relaxation to one robot"
+    elif found.routes is not None:
+        search.offer(found.routes)
+    else:
+        search.settings["greedy"] = found.reason
+    search.progress(0.0, None, None)
+
+
+def _proven(search: Search) -> bool:
+    known = search.best
+    if known is None:
+        return False
+    objective = known[0] + search.constant
+    slack = optimality_tolerance(objective, search.problem.sigma)
+    return search.bound - known[0] <= max(slack, (search.options.gap or 0.0) * abs(objective))
+
+
+def _choose(search: Search) -> Any:
+    """Return the method that fits, and note why where the choice was forced."""
+    options = search.options
+    if options.method == "routes" and options.solver not in (None, "highs"):
+        raise UsageError(f"solver: the method routes works with highs, not with {options.solver!r}")
+    if options.method == "monolith":
+        search.method = "monolith: asked for"
+        return _monolith
+    if options.solver is not None and options.method == "auto":
+        search.method = f"monolith: solver {options.solver} was asked for"
+        return _monolith
+    search.method = "monolith"
+    return _monolith
+
+
+def _monolith(search: Search) -> None:
+    options, known = search.options, search.best
+    columns = column_count(search.problem)
+    if columns > MAX_COLUMNS:
+        search.settings["monolith"] = f"not built: about {columns} columns, at most {MAX_COLUMNS}"
+        search.limit = "memory"
+        return
+    if options.left_s() == 0.0:
+        search.limit = "time"
+        return
+    constant = search.constant
+    objective = None if known is None else known[0] + constant
+    request = Request(
+        time_limit_s=options.left_s(reserve_s=_check_reserve_s(search)),
+        work_limit=options.work_limit,
+        gap_rel=options.gap or 0.0,
+        gap_abs=0.5 * optimality_tolerance(objective or 0.0, search.problem.sigma),
+        threads=options.threads,
+        seed=options.seed,
+        on_progress=search.progress,
+        should_stop=options.should_stop,
+    )
+    solver = options.solver or "highs"
+    outcome, routes = solve_monolith(
+        search.instance, search.problem, solver, request, None if known is None else known[1], search.at_step
+    )
+    search.solver, search.limit = outcome.solver, outcome.limit
+    search.settings.update(outcome.settings)
+    search.settings["solver_version"] = outcome.version
+    if routes is not None:
+        search.offer(routes)
+    if outcome.bound is not None:
+        search.bound = min(search.bound, outcome.bound - constant)
+    if outcome.status == "infeasible" and known is None:
+        search.infeasible = f"fleet: the {solver} solver proved that no plan keeps all limits together"
+
+
+def _check_reserve_s(search: Search) -> float:
+    """Seconds to keep for reading the plan back and replaying it, about 3 microseconds per row and a margin."""
+    rows = sum(search.problem.horizon + 1 - group.start_step for group in search.problem.classes for _ in group.robots)
+    return 0.01 + 2e-5 * rows
+
+
+def _finish(search: Search) -> OrosPlan:
+    """Return the best candidate that the checker accepts."""
+    begun = time.perf_counter()
+    options = search.options
+    rejected: list[str] = []
+    for worth, routes in sorted(search.candidates, key=lambda candidate: -candidate[0]):
+        plan = fill_plan(search.instance, search.problem, routes, _shell(search, worth, rejected))
+        found = check(search.instance, plan)
+        if found.ok:
+            wall_s = {**search.wall_s, "check": time.perf_counter() - begun}
+            return plan.model_copy(update={"claim": plan.claim.model_copy(update={"wall_s": wall_s})})
+        rejected.append(str(found.violations[0]))
+    if rejected:
+        raise ReactError(f"no plan passed the checker; please report this: {rejected[0]}")
+    if search.infeasible is not None:
+        claim = Claim(status="infeasible", reason=search.infeasible)
+    else:
+        limit = "interrupt" if options.stopped() else search.limit
+        claim = Claim(status="no_plan", limit=limit, bound=search.bound + search.constant)  # type: ignore[arg-type]
+    return _without_plan(
+        search.instance, options, claim.model_copy(update={"method": search.method, **_common(search)})
+    )
+
+
+def _shell(search: Search, worth: float, rejected: list[str]) -> OrosPlan:
+    """Return a plan with its claim and no robots yet."""
+    objective = worth + search.constant
+    bound = max(search.bound + search.constant, objective)  # a bound within rounding of the objective
+    slack = optimality_tolerance(objective, search.problem.sigma)
+    false_bound = search.bound + search.constant < objective - max(slack, 1e-9)
+    if false_bound:  # proven wrong by this plan: nothing is known but the relaxation
+        bound = relaxation_bound(search.problem) + search.constant
+        rejected = [*rejected, f"the bound {search.bound + search.constant} is below a checked plan"]
+    optimal = not rejected and bound - objective <= slack
+    common = _common(search)
+    if rejected:
+        common["settings"] = {**common["settings"], "rejected": rejected}
+    if search.options.stopped() and not optimal:
+        common["limit"] = "interrupt"
+    elif not optimal:
+        common["limit"] = search.limit
+    claim = Claim(
+        status="optimal" if optimal else "feasible",
+        objective=objective,
+        bound=bound,
+        gap=gap_of(objective, bound),
+        method=search.method or "greedy: its value meets the relaxation bound",
+        **common,
+    )
+    return OrosPlan(instance=instance_ref(search.instance), claim=claim)
+
+
+def _common(search: Search) -> dict[str, Any]:
+    options = search.options
+    return {
+        "solver": search.solver,
+        "versions": versions(*search.packages),
+        "seed": options.seed,
+        "threads": options.threads,
+        "settings": {
+            "time_limit_s": options.time_limit_s,
+            "work_limit": options.work_limit,
+            "gap": options.gap,
+            **({} if search.at_step is None else {"kept_steps": search.at_step}),
+            **search.settings,
+        },
+        "certificate": search.certificate,
+        "wall_s": dict(search.wall_s),
+    }
+
+
+def _without_plan(instance: OrosInstance, options: SolveOptions, claim: Claim) -> OrosPlan:
+    update = {"seed": options.seed, "threads": options.threads, "versions": claim.versions or versions()}
+    return OrosPlan(instance=instance_ref(instance), claim=claim.model_copy(update=update))
