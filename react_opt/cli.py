@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
-import click
 import typer
 from rich.console import Console
 
@@ -34,11 +33,9 @@ def main() -> NoReturn:
     try:
         code = app(standalone_mode=False)
         sys.stdout.flush()
-    except click.exceptions.NoArgsIsHelpError as error:
-        print(error.format_message(), file=sys.stderr)
-        code = BAD_INPUT
-    except click.ClickException as error:
-        where = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "react-opt"
+    except typer.TyperException as error:
+        context = getattr(error, "ctx", None)
+        where = context.command_path if context else "react-opt"
         print(f"{where}: {error.format_message()}", file=sys.stderr)
         code = BAD_INPUT
     except (InputError, UsageError, MissingPartError) as error:
@@ -47,7 +44,7 @@ def main() -> NoReturn:
     except ReactError as error:
         print(f"react-opt: {error}", file=sys.stderr)
         code = NO_PLAN
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         print("interrupted", file=sys.stderr)
         code = INTERRUPTED
     except MemoryError:

@@ -72,6 +72,11 @@ def solve(
     MissingPartError
         Where the solver asked for is not installed.
     """
+    if at_step is not None and start is None:
+        raise UsageError("at step: expected together with a plan to start from")
+    if at_step is not None and not isinstance(instance, OrosInstance):
+        raise UsageError("at step: expected an oros instance")
+    method_of = _solver_of(instance)  # importing it is not counted against the time limit
     options = SolveOptions(
         time_limit_s=time_limit_s,
         work_limit=work_limit,
@@ -84,22 +89,23 @@ def solve(
         should_stop=should_stop,
         **({} if threads is None else {"threads": threads}),
     )
-    if at_step is not None and start is None:
-        raise UsageError("at step: expected together with a plan to start from")
-    if at_step is not None and not isinstance(instance, OrosInstance):
-        raise UsageError("at step: expected an oros instance")
+    return method_of(instance, options, start, at_step)
+
+
+def _solver_of(instance: Any) -> Callable[..., Any]:
+    """Return the function that solves this kind of instance."""
     if isinstance(instance, OrosInstance):
         from react_opt.solvers.oros import solve_oros
 
-        return solve_oros(instance, options, start, at_step)
+        return solve_oros
     if isinstance(instance, AssignmentInstance):
         from react_opt.solvers.assignment import solve_assignment
 
-        return solve_assignment(instance, options, start)
+        return solve_assignment
     if isinstance(instance, InspectionInstance):
         from react_opt.solvers.inspection import solve_inspection
 
-        return solve_inspection(instance, options, start)
+        return solve_inspection
     if isinstance(instance, Mission):
         raise InputError.single("<data>", "kind", "a mission is simulated, not solved: use react-opt simulate")
     raise InputError.single("<data>", "kind", "expected an oros, assignment or inspection instance")
