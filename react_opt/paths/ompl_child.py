@@ -1,0 +1,135 @@
+"""A child process for planners that may hang: it is asked one query at a time and killed when it does not answer.
+
+Not a fork: the child is a fresh interpreter, so compiled threads and locks of the parent are no concern. Messages
+are pickles behind their length on the child's standard input and a pipe; whatever a library prints goes to
+standard error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import select
+import struct
+import subprocess
+import sys
+import time
+import weakref
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.errors import ReactError
+
+if TYPE_CHECKING:
+    from react_opt.paths.sampled import Grids
+
+FloatArray = NDArray[np.float64]
+_START_S = 120.0
+"""How long the child may take to import everything, on a cold and busy machine."""
+
+
+class SearchProcess:
+    """One planner in a child process, started at the first query and again after a kill.
+
+    Parameters
+    ----------
+    grids, planner, iterations, seed
+        See :func:`react_opt.paths.ompl_.search`; each query's seed also depends on its two ends alone.
+    patience_s
+        How long a query may take before the child is killed.
+    """
+
+    def __init__(self, grids: Grids, planner: str, iterations: int, seed: int, patience_s: float) -> None:
+        self._setup = (grids, planner, iterations, seed)
+        self._patience_s = patience_s
+        self._process: subprocess.Popen[bytes] | None = None
+        self.killed = 0
+
+    def ask(self, start_px: FloatArray, goal_px: FloatArray) -> FloatArray | None:
+        """Return a path between two points in pixel coordinates, None where none was found in time."""
+        process = self._process or self._start()
+        assert process.stdin is not None
+        _send(process.stdin, (start_px, goal_px))
+        done, path = _receive(process.stdout, time.monotonic() + self._patience_s)
+        if not done:
+            self.killed += 1
+            _end(process)
+            self._process = None
+        return path if done else None
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "react_opt.paths.ompl_child"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        weakref.finalize(self, _end, process)
+        assert process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            _send(process.stdin, self._setup)
+        ready, fault = _receive(process.stdout, time.monotonic() + _START_S)
+        if not ready or fault is not None:
+            _end(process)
+            raise ReactError(f"the path planner's process did not start{f': {fault}' if fault else ''}")
+        self._process = process
+        return process
+
+
+def _send(pipe: IO[bytes], message: Any) -> None:
+    content = pickle.dumps(message)
+    pipe.write(struct.pack("<Q", len(content)) + content)
+    pipe.flush()
+
+
+def _receive(pipe: IO[bytes] | None, deadline: float) -> tuple[bool, Any]:
+    """Return whether a whole message came before the deadline, and the message."""
+    assert pipe is not None
+    content, wanted = b"", 8
+    while len(content) < wanted:
+        ready, _, _ = select.select([pipe], [], [], max(0.0, deadline - time.monotonic()))
+        more = os.read(pipe.fileno(), 1 << 20) if ready else b""
+        if not more:
+            return False, None
+        content += more
+        if len(content) >= 8:
+            wanted = 8 + struct.unpack("<Q", content[:8])[0]
+    return True, pickle.loads(content[8:])
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(OSError):
+                pipe.close()
+
+
+def main() -> None:
+    """Answer queries from standard input until it ends."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    queries = sys.stdin.buffer
+
+    def read() -> Any:
+        head = queries.read(8)
+        return pickle.loads(queries.read(struct.unpack("<Q", head)[0])) if len(head) == 8 else None
+
+    grids, planner, iterations, seed = read()
+    try:
+        from react_opt.paths.ompl_ import ompl, search
+
+        ompl()
+    except Exception as error:  # the parent reports it: a child has nobody to raise to
+        _send(answers, repr(error))
+        return
+    _send(answers, None)
+    while (query := read()) is not None:
+        start, goal = query
+        own = np.random.SeedSequence([seed, *np.concatenate(query).view(np.uint64).tolist()])
+        _send(answers, search(grids, planner, iterations, int(own.generate_state(1)[0]), start, goal))
+
+
+if __name__ == "__main__":
+    main()
