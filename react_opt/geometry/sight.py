@@ -104,6 +104,14 @@ def clear_between_px(padded: Padded, x0: float, y0: float, x1: float, y1: float)
     if x0 == x1:
         return True
     slope = (y1 - y0) / (x1 - x0)
+    if x1 - x0 > 16.0:  # a few probes deep inside pixels settle most of the segments that are not free
+        for n in range(1, 8):
+            x = x0 + (x1 - x0) * n / 8.0
+            y = y0 + (x - x0) * slope
+            i, j = floor(x), floor(y)
+            inside = min(x - i, i + 1 - x, y - j, j + 1 - y) > 1e-3
+            if inside and _at(padded, steep, i, j):
+                return False
     first, last = floor(x0), ceil(x1) - 1
     here = y0
     for i in range(first, last + 1):
