@@ -7,6 +7,7 @@ by the independent checker.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -183,3 +184,46 @@ def _swaps(problem: RouteProblem, routes: Sequence[Route]) -> list[str]:
                     faults.append(f"routes {other} and {number} swap cells {j} and {i} at instant {begin}")
             driven.setdefault((i, j), []).append((number, begin, end))
     return faults
+
+
+def tidy(problem: RouteProblem, routes: Sequence[Route]) -> list[Route]:
+    """The same movements without sensing that earns less than it costs; chargers may then fill less.
+
+    Of several robots that sense a cell only the first does (the first in order on ties). A plan that kept every
+    limit still does, and is worth at least as much.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    routes
+        Any number of routes.
+    """
+    first = first_sensed(problem, routes)
+    taken = np.zeros(problem.n_cells, dtype=bool)
+    result = []
+    for route in routes:
+        group = problem.classes[route.robot_class]
+        at = np.flatnonzero(route.sense)
+        cells, instants = route.cell[at], at + group.start_step
+        earned = problem.reward[cells, instants]
+        keep = (first[cells] == instants) & ~taken[cells] & (earned > 0.0)
+        keep &= earned >= problem.sigma * group.sense_j
+        taken[cells[keep]] = True
+        if keep.all():
+            result.append(route)
+            continue
+        sense = np.zeros_like(route.sense)
+        sense[at[keep]] = True
+        result.append(_cut_charge(problem, replace(route, sense=sense)))
+    return result
+
+
+def _cut_charge(problem: RouteProblem, route: Route) -> Route:
+    """The same route, charging no more than its capacity takes."""
+    capacity_j = problem.classes[route.robot_class].capacity_j
+    charge_j = route.charge_j.copy()
+    for k in np.flatnonzero(charge_j > 0.0):
+        over = float(battery(problem, replace(route, charge_j=charge_j))[k]) - capacity_j
+        charge_j[k] -= min(charge_j[k], max(0.0, over))
+    return replace(route, charge_j=charge_j)
