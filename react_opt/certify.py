@@ -35,9 +35,10 @@ def check(instance: Instance, plan: Plan, bound: bool = False) -> Certificate:
     UsageError
         Where ``instance`` is not one that has plans, or the bound of such a plan cannot be recomputed.
     """
-    foreign = tuple(instance_rule(instance, plan))
-    if foreign:  # whatever else is said of a plan of another instance would be noise
-        return Certificate(foreign)
+    if not isinstance(instance, OrosInstance | AssignmentInstance | InspectionInstance):
+        raise UsageError(f"there are no plans of kind {instance.kind!r} to check")
+    if plan.kind != f"{instance.kind}_plan":
+        return Certificate(tuple(instance_rule(instance, plan)))
     if isinstance(instance, OrosInstance) and isinstance(plan, OrosPlan):
         from react_opt.certify_oros import check_oros
 
@@ -52,11 +53,11 @@ def check(instance: Instance, plan: Plan, bound: bool = False) -> Certificate:
         from react_opt.certify_assignment import check_assignment
 
         return check_assignment(instance, plan)
-    if isinstance(instance, InspectionInstance) and isinstance(plan, InspectionPlan):
-        from react_opt.certify_inspection import check_inspection
+    from react_opt.certify_inspection import check_inspection
 
-        return check_inspection(instance, plan)
-    raise UsageError(f"there are no plans of kind {instance.kind!r} to check")
+    assert isinstance(instance, InspectionInstance)
+    assert isinstance(plan, InspectionPlan)
+    return check_inspection(instance, plan)
 
 
 def _check_bound(instance: OrosInstance, plan: OrosPlan) -> tuple[tuple[Violation, ...], float | None]:

@@ -13,13 +13,14 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_vali
 from react_opt.references import ReferenceFaultsError, reference_faults
 
 MAX_HORIZON_STEPS = 100_000
+MAX_COUNT = 2**63 - 1  # whole numbers fit an int64 array, whatever reads the file
 
 Id = Annotated[str, StringConstraints(strict=True, min_length=1)]
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
-Count = Annotated[int, Field(strict=True, ge=0)]
+Count = Annotated[int, Field(strict=True, ge=0, le=MAX_COUNT)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
@@ -66,7 +67,7 @@ class TravelArc(Part):
 
     from_: Id = Field(alias="from")
     to: Id
-    steps: Annotated[int, Field(strict=True, ge=1)]
+    steps: Annotated[int, Field(strict=True, ge=1, le=MAX_COUNT)]
     energy_j: NonNegative
     speed_m_s: NonNegative | None = None
 

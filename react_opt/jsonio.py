@@ -232,6 +232,8 @@ def _message(item: Any, model: type[BaseModel]) -> str:
         known = _field_names(model)
         close = difflib.get_close_matches(str(item["loc"][-1]), known, n=1)
         return "unknown field" + (f", did you mean {close[0]!r}?" if close else "")
+    if kind == "value_error":
+        return str(context["error"])
     expected = {
         "finite_number": "a finite number",
         "float_type": "a number",

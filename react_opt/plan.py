@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
-from react_opt.instance import Part
+from react_opt.instance import MAX_COUNT, Part
 
 Status = Literal["optimal", "feasible", "infeasible", "no_plan"]
 Limit = Literal["time", "memory", "work", "interrupt", "none"]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Index = Annotated[int, Field(strict=True, ge=0)]
+Index = Annotated[int, Field(strict=True, ge=0, le=MAX_COUNT)]
 Name = Annotated[str, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
+MAX_DEPTH = 50  # of the free-form parts of a claim
 
 
 class InstanceRef(Part):
@@ -56,12 +58,29 @@ class Claim(Part):
     method: Name = ""
     solver: Name = ""
     versions: dict[str, str] = {}
-    seed: int = 0
-    threads: int = 1
+    seed: Annotated[int, Field(strict=True)] = 0
+    threads: Annotated[int, Field(strict=True)] = 1
     settings: dict[str, Any] = {}
-    wall_s: dict[str, float] = {}
+    wall_s: dict[str, Number] = {}
     certificate: dict[str, Any] | None = None
     reason: str | None = None
+
+    @field_validator("settings", "certificate")
+    @classmethod
+    def _can_be_written(cls, value: dict[str, Any] | None) -> dict[str, Any] | None:
+        _writable(value, MAX_DEPTH)
+        return value
+
+
+def _writable(value: Any, depth: int) -> None:
+    """Refuse free-form data with a NaN or an infinity, which JSON cannot hold, or nested absurdly deep."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError("expected finite numbers only")
+    if isinstance(value, dict | list | tuple):
+        if depth == 0:
+            raise ValueError(f"expected at most {MAX_DEPTH} levels of nesting")
+        for part in value.values() if isinstance(value, dict) else value:
+            _writable(part, depth - 1)
 
 
 def gap_of(objective: float | None, bound: float | None) -> float | None:
