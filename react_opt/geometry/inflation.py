@@ -157,8 +157,19 @@ class FreeSpace:
             return "inside an obstacle"
         if value == UNKNOWN and self.unknown == "blocked":
             return "in unknown space, which counts as blocked"
-        clearance = float(self.clearance_at(point_m)[0])
+        clearance = self._distance_to_blocked(x, y)
         return f"{clearance:.3f} m from an obstacle, less than the footprint's {self.footprint.radius_m:.3f} m"
+
+    def _distance_to_blocked(self, x: float, y: float) -> float:
+        """Return the exact distance, m, from (column, row) on the source map to what blocks."""
+        cells = self.source.cells
+        rows, cols = np.nonzero(cells != FREE if self.unknown == "blocked" else cells == OCCUPIED)
+        dx = np.maximum(np.maximum(cols - x, x - cols - 1), 0)
+        dy = np.maximum(np.maximum(rows - y, y - rows - 1), 0)
+        nearest = float(np.hypot(dx, dy).min(initial=np.inf))
+        if self.unknown == "blocked":
+            nearest = min(nearest, x, self.source.cols - x, y, self.source.rows - y)
+        return nearest * self.source.resolution_m
 
     def nearest_free_point(self, point_m: ArrayLike, region: int | None = None) -> FloatArray | None:
         """Return the nearest point where the footprint may stand; the point itself where it may.
