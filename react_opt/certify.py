@@ -37,8 +37,9 @@ def check(instance: Instance, plan: Plan, bound: bool = False) -> Certificate:
     """
     if not isinstance(instance, OrosInstance | AssignmentInstance | InspectionInstance):
         raise UsageError(f"there are no plans of kind {instance.kind!r} to check")
-    if plan.kind != f"{instance.kind}_plan":
-        return Certificate(tuple(instance_rule(instance, plan)))
+    foreign = tuple(instance_rule(instance, plan))
+    if foreign:  # whatever else is said of a plan of another instance would be noise
+        return Certificate(foreign)
     if isinstance(instance, OrosInstance) and isinstance(plan, OrosPlan):
         from react_opt.certify_oros import check_oros
 
