@@ -50,9 +50,9 @@ class Frozen:
             keep = len(routes[place].cell) - (self.problem.horizon + 1 - self.problem.classes[k].start_step)
             route = routes[place]
             first_sense = route.sense[keep:].copy()
-            # What was sensed and charged at the first free instant is part of what is fixed.
-            if keep < len(self.head[place].cell):
-                first_sense[0] = False
+            # What was sensed and charged by the instant from which it is free is fixed already.
+            if len(self.head[place].cell):
+                first_sense[0] &= not self.head[place].sense[-1]
             charge = route.charge_j[keep:].copy()
             charge[0] = 0.0
             result.append(Route(k, route.cell[keep:], route.arc[keep:], first_sense, charge))

@@ -120,7 +120,7 @@ def fill_plan(instance: OrosInstance, problem: RouteProblem, routes: Sequence[Ro
             "robots": tuple(robots),
             "explored": tuple(
                 Explored(cell=instance.cells[i].id, step=t, robot=r)
-                for i, t, r in sorted(explored, key=lambda x: x[:2])
+                for i, t, r in sorted(explored, key=lambda x: (x[1], x[0]))
             ),
             "objective": OrosPlanObjective(
                 coverage=coverage, battery=weighted, battery_j=left_j, total=coverage + weighted
