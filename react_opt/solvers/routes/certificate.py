@@ -1,0 +1,67 @@
+"""The certificate of a Lagrangian bound: all that is needed to compute it again, as plain JSON data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from react_opt.route_problem import RouteProblem
+from react_opt.solvers.routes.columns import Rank1Cut
+from react_opt.solvers.routes.cuts import SubsetRow
+from react_opt.solvers.routes.generation import Multipliers
+from react_opt.solvers.routes.memory import Memory
+from react_opt.solvers.routes.rows import SenseRow, StandRow
+
+
+def certificate(
+    problem: RouteProblem,
+    memory: Memory,
+    best: Multipliers,
+    cuts: Sequence[Rank1Cut],
+    rows: Sequence[Rank1Cut],
+) -> dict[str, Any]:
+    """Return the certificate of a bound.
+
+    ``bound = sum(cell_price) + sum(price * rhs) + sum_k robots_k * best_k``, where ``best_k`` is the most that a
+    route of class k is worth after its prices when it may collect again what it has forgotten: standing in cell
+    j it remembers the cells of ``memory[j]`` only. Cells are indices into ``cells[]``, robots into ``robots[]``.
+
+    Parameters
+    ----------
+    problem
+        The route problem.
+    memory
+        The ng-sets with which the bound was computed.
+    best
+        The multipliers and the bound.
+    cuts, rows
+        The cuts and rows that the multipliers price.
+    """
+    priced_cuts = [
+        {"cells": sorted(cut.cells), "memory": sorted(cut.memory), "price": float(price)}
+        for cut, price in zip(cuts, best.duals.cut, strict=True)
+        if price > 0 and isinstance(cut, SubsetRow)
+    ]
+    priced_rows: list[dict[str, Any]] = []
+    for row, price in zip(rows, best.duals.row, strict=True):
+        if price <= 0:
+            continue
+        if isinstance(row, StandRow):
+            place = {"rule": "robots_per_cell", "cell": row.cell, "t": problem.horizon - row.from_end}
+        elif isinstance(row, SenseRow):
+            place = {"rule": "sensing_robots_per_step", "t": problem.horizon - row.from_end}
+        else:
+            continue
+        priced_rows.append({**place, "price": float(price)})
+    return {
+        "kind": "lagrangian",
+        "bound": float(best.bound),
+        "cell_price": [float(price) for price in best.duals.cell],
+        "classes": [
+            {"robots": list(group.robots), "best": float(worth)}
+            for group, worth in zip(problem.classes, best.duals.group, strict=True)
+        ],
+        "memory": "all" if memory.complete else [sorted(cells) for cells in memory.near],
+        "cuts": priced_cuts,
+        "rows": priced_rows,
+    }

@@ -1,0 +1,334 @@
+"""The decomposition: the recipe from a route problem to a plan, its bound and the proof."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from react_opt.route_problem import Route, RouteProblem
+from react_opt.solvers.routes.budget import Budget, Limit, OnProgress, Standing
+from react_opt.solvers.routes.certificate import certificate
+from react_opt.solvers.routes.columns import Column
+from react_opt.solvers.routes.cuts import separate
+from react_opt.solvers.routes.enumeration import enumerate_routes
+from react_opt.solvers.routes.generation import Generation
+from react_opt.solvers.routes.greedy import greedy
+from react_opt.solvers.routes.master import Master
+from react_opt.solvers.routes.memory import Memory, fewest_steps
+from react_opt.solvers.routes.pricing import RoutePricer, route_column
+from react_opt.solvers.routes.replay import tidy
+from react_opt.solvers.routes.rows import violated_limits
+from react_opt.solvers.routes.search import improve
+from react_opt.solvers.routes.selection import select
+
+FIRST_MEMORY = 8
+MOST_CUTS = 64
+Status = Literal["optimal", "feasible", "infeasible", "no_plan", "not_priced"]
+
+
+@dataclass(frozen=True)
+class RoutesResult:
+    """What the decomposition found and knows.
+
+    Parameters
+    ----------
+    routes
+        One route per robot, classes in order; None if no plan was found.
+    objective, bound
+        Value of the plan and proven bound on every plan; None where unknown.
+    status
+        ``optimal``, ``feasible``, ``infeasible`` (proven), ``no_plan``, or ``not_priced``: the instance has an
+        option that the decomposition cannot price.
+    limit
+        What stopped it.
+    certificate
+        What recomputes the bound (see ``docs/decomposition.md``); empty if there is none.
+    iterations
+        Units of work done: pricings, linear programmes, iterations of the primal search.
+    notes
+        How the bound came about and what was not possible, in words.
+    """
+
+    routes: list[Route] | None
+    objective: float | None
+    bound: float | None
+    status: Status
+    limit: Limit
+    certificate: dict[str, Any] = field(default_factory=dict)
+    iterations: int = 0
+    notes: tuple[str, ...] = ()
+
+
+def unpriced(problem: RouteProblem) -> str | None:
+    """Return why the decomposition cannot price a problem, None if it can.
+
+    Parameters
+    ----------
+    problem
+        The route problem.
+    """
+    if problem.charger_j.any():
+        return "chargers are not priced by the route decomposition"
+    return None
+
+
+def solve_routes(
+    problem: RouteProblem,
+    *,
+    deadline: float | None = None,
+    work_limit: int | None = None,
+    gap: float | None = None,
+    threads: int = 1,
+    seed: int = 0,
+    start: Sequence[Route] | None = None,
+    on_progress: OnProgress | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> RoutesResult:
+    """Solve a route problem by branch-price-and-cut.
+
+    Parameters
+    ----------
+    problem
+        The route problem.
+    deadline
+        ``time.perf_counter()`` value at which to return.
+    work_limit
+        Units of work (pricings, linear programmes, iterations of the primal search); with it, one thread and no
+        deadline the result is reproducible.
+    gap
+        Relative gap at which to stop; None for proven optimality.
+    threads
+        Threads to use.
+    seed
+        Seed of all randomness.
+    start
+        A feasible plan to start from, one route per robot, classes in order.
+    on_progress
+        Called with elapsed seconds, incumbent and bound.
+    should_stop
+        Polled; True stops as an interrupt.
+    """
+    reason = unpriced(problem)
+    if reason is not None:
+        return RoutesResult(None, None, None, "not_priced", "none", notes=(reason,))
+    budget = Budget(deadline, work_limit, should_stop)
+    standing = Standing(problem, budget, gap, on_progress)
+    if start is not None:
+        standing.offer(start)
+    if standing.routes is None:
+        first = greedy(problem, deadline, seed)
+        if first.routes is not None:
+            standing.offer(first.routes)
+        elif first.reason is not None and not isinstance(first.reason, str):
+            return RoutesResult(None, None, None, "infeasible", "none", notes=(first.reason.text,))
+    search = _Proof(problem, standing, threads, seed)
+    search.run()
+    return search.result()
+
+
+class _Proof:
+    """The state of one solve."""
+
+    def __init__(self, problem: RouteProblem, standing: Standing, threads: int, seed: int) -> None:
+        self.problem, self.standing, self.threads, self.seed = problem, standing, threads, seed
+        self.counts = [len(group.robots) for group in problem.classes]
+        self.memory = Memory(fewest_steps(problem), FIRST_MEMORY)
+        self.pricer = RoutePricer(problem, self.memory)
+        most = float(problem.reward.max(axis=1, initial=0.0).sum()) + standing.lattice.battery_j * problem.sigma
+        self.master = Master(problem.n_cells, self.counts, 2.0 * most + 1.0, threads)
+        self.generation = Generation(self.master, self.pricer, standing)
+        self.notes: list[str] = []
+        self.coupled = (
+            problem.robots_per_cell is not None or problem.sensing_robots_per_step is not None or problem.forbid_swaps
+        )
+        self.proof: dict[str, Any] = {}
+
+    def run(self) -> None:
+        """Go on until the plan is proven or a limit is reached."""
+        if self.standing.routes is not None:
+            self.master.add([route_column(self.problem, route) for route in self.standing.routes])
+        while not self.standing.done():
+            solved = self.generation.converge(at_root=True)
+            self._keep_certificate()
+            if self.standing.done():
+                break
+            if not solved:
+                break
+            if self._add_limits() or self._grow_memory():
+                continue
+            self._improve()
+            if self.standing.done() or self._finish_by_enumeration():
+                break
+            if not self._cut():
+                break
+        if not self.standing.done() and self.standing.budget.limit == "none":
+            self._search_on()
+
+    def result(self) -> RoutesResult:
+        """Return what is known."""
+        standing = self.standing
+        proven = standing.proven()
+        status: Status = "optimal" if proven else "feasible" if standing.routes is not None else "no_plan"
+        return RoutesResult(
+            standing.routes,
+            standing.objective,
+            standing.bound,
+            status,
+            "none" if proven else standing.budget.limit,
+            self.proof,
+            standing.budget.work,
+            tuple(self.notes),
+        )
+
+    def _keep_certificate(self) -> None:
+        best = self.generation.best
+        if best is not None and (not self.proof or best.bound < self.proof["bound"]):
+            self.proof = certificate(self.problem, self.memory, best, self.master.cuts, self.master.rows)
+
+    def _add_limits(self) -> bool:
+        """Add limits between robots that the linear programme breaks."""
+        point = self.generation.point
+        if point is None or not self.coupled:
+            return False
+        rows = violated_limits(self.problem, self.master.columns, point.use)
+        self.master.add_rows(rows)
+        return bool(rows)
+
+    def _grow_memory(self) -> bool:
+        """Remember cells along the cycles of routes in use; return whether anything was added."""
+        point = self.generation.point
+        if point is None:
+            return False
+        pairs: list[tuple[int, int]] = []
+        for k in np.flatnonzero(point.use > 1e-6):
+            column = self.master.columns[k]
+            if not column.elementary:
+                pairs += _cycles(column.path)
+        if not self.memory.grow(pairs):
+            return False
+        self.pricer.remember()
+        self.master.drop(lambda column: not column.elementary and not self.memory.allows(column.path))
+        return True
+
+    def _improve(self) -> None:
+        """Look for better plans: whole columns of the master, then a short primal search."""
+        standing = self.standing
+        left = standing.budget.left_s()
+        chosen = select(
+            self._simple_columns(),
+            self.problem.n_cells,
+            self.counts,
+            gap=0.1 * (standing.slack or 0.0),
+            floor=None,
+            time_limit_s=5.0 if left is None else min(5.0, 0.2 * left),
+            node_limit=200,
+            seed=self.seed,
+        )
+        standing.budget.spend()
+        if chosen.columns is not None:
+            standing.offer([column.path for column in chosen.columns])
+        if standing.routes is None or standing.done():
+            return
+
+    def _simple_columns(self) -> list[Column]:
+        """Return the master's best columns, second collections of a cell left out."""
+        point = self.generation.point
+        columns = self.master.columns
+        if point is not None:
+            reduced = self.master.reduced_values(point.duals)
+            columns = [columns[k] for k in np.argsort(-reduced, kind="stable")[:3000]]
+        return [
+            column if column.elementary else route_column(self.problem, tidy(self.problem, [column.path])[0])
+            for column in columns
+        ]
+
+    def _finish_by_enumeration(self) -> bool:
+        """Enumerate all routes that a better plan can contain and choose among them; return whether it was done."""
+        standing, best = self.standing, self.generation.best
+        if best is None or self.coupled or standing.objective is None:
+            return False
+        if any(row for row in self.master.rows):
+            return False
+        gap = best.bound - standing.objective + 1e-7 * max(1.0, abs(best.bound))
+        columns: list[Column] = []
+        for group in range(len(self.counts)):
+            found = enumerate_routes(
+                self.pricer,
+                group,
+                best.duals,
+                float(best.duals.group[group]) - gap,
+                self.generation.side,
+                self.master.cuts,
+            )
+            standing.budget.spend()
+            if found is None:
+                return False
+            columns += found
+        chosen = select(
+            columns,
+            self.problem.n_cells,
+            self.counts,
+            gap=0.5 * (standing.slack or 0.0),
+            floor=None,
+            time_limit_s=standing.budget.left_s(),
+            node_limit=None,
+            seed=self.seed,
+            threads=self.threads,
+        )
+        standing.budget.spend()
+        if chosen.columns is not None:
+            standing.offer([column.path for column in chosen.columns])
+        if chosen.bound is None or standing.objective is None:
+            return False
+        # what was not enumerated cannot beat the incumbent that set the floor
+        standing.lower_bound_to(max(chosen.bound, standing.objective))
+        if chosen.solved:
+            self.notes.append(
+                f"bound from the enumeration of {len(columns)} routes within {gap:.6g} of the Lagrangian bound "
+                f"{best.bound:.9g}, solved as a MILP"
+            )
+        return chosen.solved
+
+    def _cut(self) -> bool:
+        """Add violated subset-row cuts; return whether there were any."""
+        point = self.generation.point
+        if point is None:
+            return False
+        cuts = separate(self.master.columns, point.use, self.problem.n_cells, self.master.cuts)
+        cuts = cuts[: MOST_CUTS - len(self.master.cuts)]
+        self.master.add_cuts(cuts)
+        return bool(cuts)
+
+    def _search_on(self) -> None:
+        """Spend what is left on the primal search."""
+        standing = self.standing
+        if standing.routes is None or (standing.budget.deadline is None and standing.budget.work_limit is None):
+            return
+        left = None
+        if standing.budget.work_limit is not None:
+            left = standing.budget.work_limit - standing.budget.work
+            standing.budget.spend(left)
+        improve(
+            self.problem,
+            standing.routes,
+            deadline=standing.budget.deadline,
+            work_limit=left,
+            seed=self.seed,
+            should_stop=standing.done,
+            on_improve=lambda routes, _: standing.offer(routes) and None,
+        )
+
+
+def _cycles(route: Route) -> list[tuple[int, int]]:
+    """Return the pairs (place, cell) that would have kept a route from collecting a cell twice."""
+    pairs: list[tuple[int, int]] = []
+    last: dict[int, int] = {}
+    for position in np.flatnonzero(route.sense):
+        cell = int(route.cell[position])
+        if cell in last:
+            pairs += [(int(place), cell) for place in route.cell[last[cell] : position] if place >= 0]
+        last[cell] = int(position)
+    return pairs

@@ -1,0 +1,199 @@
+"""Column generation: the linear programme over all routes, with a proven bound at every exact pricing.
+
+For any multipliers pi, prices >= 0 of cuts and rows, and the best reduced value of each class,
+
+    bound = sum_i pi_i + sum_c price_c rhs_c + sum_k n_k max_r (v_r - prices of r)
+
+is above every plan (Lagrangian relaxation). Prices are smoothed towards those of the best bound (Wentges 1997).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from react_opt.route_problem import FloatArray
+from react_opt.solvers.routes.budget import Standing
+from react_opt.solvers.routes.columns import Column, Duals, Priced
+from react_opt.solvers.routes.master import Master, MasterPoint
+from react_opt.solvers.routes.pricing import RoutePricer, SidePrices
+from react_opt.solvers.routes.rows import side_prices
+
+SMOOTHING = 0.6
+BEAM = 4
+COLUMNS = 8
+TAKEN = 1e9
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Prices and the bound they prove.
+
+    Parameters
+    ----------
+    bound
+        The Lagrangian bound.
+    duals
+        The prices; ``duals.group`` holds the best reduced value of each class, so that the bound is
+        ``sum(cell) + sum(price * rhs) + sum(n_k * group_k)``.
+    """
+
+    bound: float
+    duals: Duals
+
+
+class Generation:
+    """Column generation on one master.
+
+    Parameters
+    ----------
+    master, pricer
+        The restricted master and the pricer.
+    standing
+        Best plan and bound, and the limits.
+    """
+
+    def __init__(self, master: Master, pricer: RoutePricer, standing: Standing) -> None:
+        self.master, self.pricer, self.standing = master, pricer, standing
+        self.counts = np.array(master.counts, dtype=np.float64)
+        self.best: Multipliers | None = None
+        self.point: MasterPoint | None = None
+        self.side = SidePrices()
+        self._exact_s = self._beam_s = 0.0
+
+    def converge(self, *, at_root: bool, enough: float | None = None) -> bool:
+        """Generate columns until the linear programme is solved; return whether it is.
+
+        Stops early (returning False) at a limit, or when the bound proves the incumbent or drops to ``enough``.
+
+        Parameters
+        ----------
+        at_root
+            Whether a bound found here holds for the whole problem.
+        enough
+            Bound that suffices.
+        """
+        self.best = None
+        centre: Duals | None = None
+        smoothing = SMOOTHING
+        while not self.standing.budget.over():
+            point = self.master.solve(self.standing.budget.left_s())
+            self.standing.budget.spend()
+            if point is None:
+                return False
+            self.point = point
+            duals = point.duals if centre is None else _between(point.duals, centre, smoothing)
+            columns, priced = self._price(duals)
+            if priced.best is not None:
+                bound = self.bound(duals, priced.best)
+                if self.best is None or bound < self.best.bound:
+                    self.best = Multipliers(bound, replace(duals, group=priced.best))
+                    centre = duals
+                if at_root:
+                    self.standing.lower_bound_to(bound)
+                if self._settled(self.best.bound, enough):
+                    return False
+            elif centre is None:
+                centre = duals
+            gap = np.inf if self.best is None else self.best.bound - point.value
+            added = self.master.add(columns)
+            if gap <= 1e-8 * max(1.0, abs(point.value)):
+                return True
+            if added == 0:
+                if smoothing == 0.0 and priced.best is not None:
+                    return True
+                smoothing = 0.0
+            else:
+                smoothing = SMOOTHING if gap > 1e-5 * abs(point.value) else 0.5 * SMOOTHING
+        return False
+
+    def bound(self, duals: Duals, best: FloatArray) -> float:
+        """Return the Lagrangian bound of some prices.
+
+        Parameters
+        ----------
+        duals
+            Prices, of which ``group`` is not used.
+        best
+            ``(n_groups,)`` bound on value minus prices of every column of each class.
+        """
+        total = float(duals.cell.sum()) + float(self.counts @ best)
+        total += sum(price * cut.rhs for price, cut in zip(duals.cut, self.master.cuts, strict=True))
+        return total + sum(price * row.rhs for price, row in zip(duals.row, self.master.rows, strict=True))
+
+    def _settled(self, bound: float, enough: float | None) -> bool:
+        bound = self.standing.lattice.round_down(bound)
+        return self.standing.proven(bound) or (enough is not None and bound <= enough)
+
+    def _price(self, duals: Duals) -> tuple[list[Column], Priced]:
+        """Return columns from a beam and its complements, and the exact pricing that bounds them."""
+        began = time.perf_counter()
+        side = side_prices(self.side, self.master.rows, duals.row, self.pricer.problem)
+        lowest = np.full(len(self.counts), -TAKEN)
+        columns: list[Column] = []
+        floor = np.full(len(self.counts), -TAKEN)
+        for group in range(len(self.counts)):
+            beam = self.pricer.price(
+                duals, side, self.master.cuts, width=BEAM, columns=COLUMNS, groups=[group], floor=lowest
+            )
+            columns += beam.columns
+            if beam.columns:
+                floor[group] = beam.top[group] + 1e-9 * max(1.0, abs(beam.top[group]))
+        columns += self._complements(duals, side, columns)
+        self.standing.budget.spend()
+        middle = time.perf_counter()
+        exact = self.pricer.price(duals, side, self.master.cuts, columns=COLUMNS, floor=floor)
+        self.standing.budget.spend()
+        self._beam_s, self._exact_s = middle - began, time.perf_counter() - middle
+        return columns + exact.columns, exact
+
+    def _complements(self, duals: Duals, side: SidePrices, columns: list[Column]) -> list[Column]:
+        """Return columns that avoid each other's cells: together a plan at the given prices."""
+        if not columns:
+            return []
+        best: dict[int, Column] = {}
+        for column in columns:
+            best.setdefault(column.group, column)
+        first = max(best)
+        chosen = [best[first]]
+        cell = duals.cell.copy()
+        cell[list(chosen[0].cells)] = TAKEN
+        found: list[Column] = []
+        for group in np.repeat(np.arange(len(self.counts)), self.master.counts):
+            if group == first:
+                first = -1
+                continue
+            priced = self.pricer.price(
+                replace(duals, cell=cell),
+                side,
+                self.master.cuts,
+                width=BEAM,
+                columns=2,
+                groups=[int(group)],
+                floor=np.full(len(self.counts), -TAKEN),
+            )
+            if not priced.columns:
+                return found
+            found += priced.columns
+            chosen.append(priced.columns[0])
+            cell[list(priced.columns[0].cells)] = TAKEN
+        self.standing.offer([c.path for c in sorted(chosen, key=lambda c: c.group)])
+        return found
+
+
+def _between(duals: Duals, centre: Duals, share: float) -> Duals:
+    """Return multipliers between two, ``share`` of the way to the centre."""
+    if len(duals.cut) != len(centre.cut) or len(duals.row) != len(centre.row):
+        return duals
+    return Duals(
+        *(
+            share * c + (1.0 - share) * d
+            for c, d in zip(
+                (centre.cell, centre.group, centre.cut, centre.row),
+                (duals.cell, duals.group, duals.cut, duals.row),
+                strict=True,
+            )
+        )
+    )

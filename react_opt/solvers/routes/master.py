@@ -1,0 +1,221 @@
+"""The restricted master: which columns to use, as a linear programme that grows in HiGHS.
+
+    max  sum_r v_r x_r
+    s.t. sum_r a_ir x_r <= 1        each cell earns once          (price pi_i >= 0)
+         sum_{r of k} x_r  = n_k    one route per robot           (multiplier mu_k)
+         cuts and side rows  <= rhs                               (prices >= 0)
+         x >= 0
+
+with a_ir how often column r collects cell i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import highspy
+import numpy as np
+
+from react_opt.route_problem import FloatArray, IntArray
+from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut, counted
+
+
+@dataclass(frozen=True)
+class MasterPoint:
+    """An optimum of the restricted master.
+
+    Parameters
+    ----------
+    value
+        Its objective.
+    use
+        ``(n_columns,)`` how much each column is used.
+    duals
+        Multipliers, clipped to their sign.
+    lacking
+        How much of the robots could not be given a column (0 unless the columns are infeasible together).
+    """
+
+    value: float
+    use: FloatArray
+    duals: Duals
+    lacking: float
+
+
+class Master:
+    """The restricted master problem.
+
+    Parameters
+    ----------
+    n_cells
+        Number of cells.
+    counts
+        Number of robots of each group.
+    penalty
+        What leaving a robot without a column costs; larger than any plan's value.
+    threads
+        Threads for HiGHS.
+    """
+
+    def __init__(self, n_cells: int, counts: Sequence[int], penalty: float, threads: int = 1) -> None:
+        self.n_cells = n_cells
+        self.counts = tuple(counts)
+        self.columns: list[Column] = []
+        self._known: set[tuple[int, bytes, bytes]] = set()
+        self.cuts: list[Rank1Cut] = []
+        self.rows: list[Rank1Cut] = []
+        self._cut_rows: list[int] = []
+        self._side_rows: list[int] = []
+        self._penalty = penalty
+        self._threads = threads
+        self._start()
+
+    def _start(self) -> None:
+        """Make an empty model with cell and group rows and one artificial column per group."""
+        self._lp = highspy.Highs()
+        self._lp.setOptionValue("output_flag", False)
+        self._lp.setOptionValue("threads", self._threads)
+        self._lp.setOptionValue("presolve", "off")
+        self._lp.setOptionValue("primal_feasibility_tolerance", 1e-9)
+        self._lp.setOptionValue("dual_feasibility_tolerance", 1e-9)
+        none_int, none = np.zeros(0, dtype=np.int32), np.zeros(0)
+        inf = highspy.kHighsInf
+        upper = np.concatenate((np.ones(self.n_cells), np.array(self.counts, dtype=np.float64)))
+        lower = np.concatenate((np.full(self.n_cells, -inf), np.array(self.counts, dtype=np.float64)))
+        starts = np.zeros(len(upper), dtype=np.int32)
+        self._lp.addRows(len(upper), lower, upper, 0, starts, none_int, none)
+        groups = len(self.counts)
+        self._lp.addCols(
+            groups,
+            np.full(groups, self._penalty),
+            np.zeros(groups),
+            np.full(groups, inf),
+            groups,
+            np.arange(groups, dtype=np.int32),
+            np.arange(self.n_cells, self.n_cells + groups, dtype=np.int32),
+            np.ones(groups),
+        )
+
+    def add(self, columns: Iterable[Column]) -> int:
+        """Add columns that are not there yet; return how many were added."""
+        fresh = []
+        for column in columns:
+            key = _key(column)
+            if key not in self._known:
+                self._known.add(key)
+                fresh.append(column)
+        if not fresh:
+            return 0
+        starts, index, value = [], [], []
+        for column in fresh:
+            starts.append(sum(len(part) for part in index))
+            rows, times = self._entries(column)
+            index.append(rows)
+            value.append(times)
+        indices = np.concatenate(index).astype(np.int32)
+        self._lp.addCols(
+            len(fresh),
+            -np.array([column.value for column in fresh]),
+            np.zeros(len(fresh)),
+            np.full(len(fresh), highspy.kHighsInf),
+            len(indices),
+            np.array(starts, dtype=np.int32),
+            indices,
+            np.concatenate(value),
+        )
+        self.columns += fresh
+        return len(fresh)
+
+    def _entries(self, column: Column) -> tuple[IntArray, FloatArray]:
+        """Return the rows of a column and its coefficients there."""
+        rows, times = counted(column.cells)
+        extra = [
+            (row, row_cut.coefficient(column))
+            for row, row_cut in zip(self._cut_rows + self._side_rows, self.cuts + self.rows, strict=True)
+        ]
+        extra = [(row, coefficient) for row, coefficient in extra if coefficient]
+        return (
+            np.concatenate((rows, [self.n_cells + column.group], [row for row, _ in extra])).astype(np.int64),
+            np.concatenate((times, [1.0], [coefficient for _, coefficient in extra])),
+        )
+
+    def drop(self, unwanted: Callable[[Column], bool]) -> None:
+        """Remove all columns that a test picks out."""
+        gone = [k for k, column in enumerate(self.columns) if unwanted(column)]
+        if not gone:
+            return
+        index = np.array(gone, dtype=np.int32) + len(self.counts)
+        self._lp.deleteCols(len(index), index)
+        for k in reversed(gone):
+            self._known.discard(_key(self.columns[k]))
+            del self.columns[k]
+
+    def add_cuts(self, cuts: Sequence[Rank1Cut]) -> None:
+        """Add cuts (priced through ``Duals.cut``)."""
+        for cut in cuts:
+            self._cut_rows.append(self._add_row(cut))
+            self.cuts.append(cut)
+
+    def add_rows(self, rows: Sequence[Rank1Cut]) -> None:
+        """Add side rows (priced through ``Duals.row``)."""
+        for row in rows:
+            self._side_rows.append(self._add_row(row))
+            self.rows.append(row)
+
+    def _add_row(self, row: Rank1Cut) -> int:
+        groups = len(self.counts)
+        pairs = [(k + groups, row.coefficient(column)) for k, column in enumerate(self.columns)]
+        pairs = [(k, coefficient) for k, coefficient in pairs if coefficient]
+        index = np.array([k for k, _ in pairs], dtype=np.int32)
+        values = np.array([coefficient for _, coefficient in pairs])
+        self._lp.addRow(-highspy.kHighsInf, row.rhs, len(index), index, values)
+        return int(self._lp.getNumRow()) - 1
+
+    def solve(self, time_limit_s: float | None = None) -> MasterPoint | None:
+        """Return the optimum of the linear programme; None if the time did not suffice.
+
+        Parameters
+        ----------
+        time_limit_s
+            Wall-clock limit of this solve; None is unlimited.
+        """
+        if time_limit_s is not None:
+            self._lp.setOptionValue("time_limit", float(self._lp.getRunTime()) + max(0.01, time_limit_s))
+        self._lp.run()
+        if self._lp.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+            self._lp.clearSolver()
+            self._lp.run()
+            if self._lp.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+                return None
+        solution = self._lp.getSolution()
+        price = -np.array(solution.row_dual)
+        use = np.array(solution.col_value)
+        groups, n = len(self.counts), self.n_cells
+        duals = Duals(
+            np.maximum(price[:n], 0.0),
+            price[n : n + groups],
+            np.maximum(price[self._cut_rows], 0.0) if self._cut_rows else np.zeros(0),
+            np.maximum(price[self._side_rows], 0.0) if self._side_rows else np.zeros(0),
+        )
+        value = -float(self._lp.getInfo().objective_function_value)
+        return MasterPoint(value, use[groups:], duals, float(use[:groups].sum()))
+
+    def reduced_values(self, duals: Duals) -> FloatArray:
+        """Return value minus prices of every column held."""
+        reduced = np.empty(len(self.columns))
+        for k, column in enumerate(self.columns):
+            rows, times = counted(column.cells)
+            reduced[k] = column.value - duals.group[column.group] - float(times @ duals.cell[rows])
+        for cut, price in zip(self.cuts, duals.cut, strict=True):
+            if price > 0:
+                reduced -= price * np.array([cut.coefficient(column) for column in self.columns])
+        for row, price in zip(self.rows, duals.row, strict=True):
+            if price > 0:
+                reduced -= price * np.array([row.coefficient(column) for column in self.columns])
+        return reduced
+
+
+def _key(column: Column) -> tuple[int, bytes, bytes]:
+    """Return what tells a column from others: its group and where and when it stands and senses."""
+    return column.group, column.path.cell.tobytes(), column.path.sense.tobytes()

@@ -1,0 +1,374 @@
+"""Pricing of robots' routes: the best route for given prices, by labels over the time-expanded graph."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
+from react_opt.solvers.routes.columns import Column, Duals, Priced
+from react_opt.solvers.routes.cuts import SubsetRow
+from react_opt.solvers.routes.labels import (
+    NEVER,
+    Fuel,
+    Graph,
+    Labels,
+    Prices,
+    flat_values,
+    grow_labels,
+    trace,
+)
+from react_opt.solvers.routes.memory import Memory
+
+MAX_LABELS = 20_000_000
+COARSE_SIZE = 8
+
+
+@dataclass(frozen=True)
+class SidePrices:
+    """Prices of standing in a cell at an instant and of sensing at an instant, and what branching forbids.
+
+    Parameters
+    ----------
+    stand
+        ``(T + 1, n)`` price of standing, infinite where it is forbidden; None if there is none.
+    sense
+        ``(T + 1,)`` price of sensing; None if there is none.
+    first, last
+        ``(n,)`` instants between which each cell may be collected.
+    """
+
+    stand: FloatArray | None = None
+    sense: FloatArray | None = None
+    first: IntArray | None = None
+    last: IntArray | None = None
+
+
+NO_SIDE_PRICES = SidePrices()
+
+
+class RoutePricer:
+    """Finds routes of positive reduced value.
+
+    Parameters
+    ----------
+    problem
+        The route problem.
+    memory
+        The ng-sets; :meth:`remember` has to be called when they have grown.
+    """
+
+    def __init__(self, problem: RouteProblem, memory: Memory) -> None:
+        self.problem = problem
+        self.memory = memory
+        n, horizon = problem.n_cells, problem.horizon
+        by_target = np.lexsort((problem.arc_from, problem.arc_to))
+        self._in_arcs = by_target.astype(np.int64)
+        self._in_start = np.searchsorted(problem.arc_to[by_target], np.arange(n + 1)).astype(np.int64)
+        self._out_arcs = np.arange(problem.n_arcs, dtype=np.int64)
+        self._no_labels = _no_labels()
+        self._no_stand = np.zeros((1, 1))
+        self.remember()
+        self._origin = []
+        self._finish = []
+        self._fuel: list[tuple[Fuel, Fuel]] = []
+        no_gain = np.zeros((horizon + 1, n))
+        for group in problem.classes:
+            origin = np.full(n, NEVER)
+            origin[group.start] = 0.0
+            finish = np.zeros(n) if group.return_to < 0 else np.full(n, NEVER)
+            if group.return_to >= 0:
+                finish[group.return_to] = 0.0
+            self._origin.append(origin)
+            self._finish.append(finish)
+            costs = self._prices(no_gain, self._no_stand, -problem.arc_energy_j, -group.wait_j, (), ())
+            most = flat_values(self.forward, costs, origin, group.start_step, False).max(initial=NEVER)
+            budget = group.battery_j - group.reserve_j
+            collectable = int(np.count_nonzero(problem.reward.max(axis=1, initial=0.0) > 0))
+            most += group.sense_j * min(collectable, horizon - max(1, group.start_step) + 1)
+            binds = most > budget * (1 + 1e-12)
+            slack = budget + 1e-9 * max(1.0, budget) if binds else np.inf
+            costs = self._prices(no_gain, self._no_stand, problem.arc_energy_j, group.wait_j, (), ())
+            ahead = -flat_values(self.forward, costs, origin, group.start_step, False)
+            behind = -flat_values(self.backward, costs, finish, 0, False)
+            self._fuel.append(
+                (
+                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, behind[::-1].copy()),
+                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, ahead[::-1].copy()),
+                )
+            )
+
+    def remember(self) -> None:
+        """Take over ng-sets that have grown."""
+        problem, memory = self.problem, self.memory
+        keep = memory.kept(problem.arc_from, problem.arc_to)
+        bits, cell_of = memory.bits(), memory.cell_of()
+        place = np.arange(problem.n_cells)[:, None]
+        there = np.where(cell_of >= 0, memory.steps[place, cell_of], 0).astype(np.int32)
+        back = np.where(cell_of >= 0, memory.steps[cell_of, place], 0).astype(np.int32)
+        into, out = self._in_arcs, self._out_arcs
+        coarse = keep & memory.kept(problem.arc_from, problem.arc_to, COARSE_SIZE)
+        self.forward = Graph(
+            self._in_start,
+            problem.arc_from[into],
+            problem.arc_steps[into],
+            into,
+            keep[into],
+            bits,
+            cell_of,
+            there,
+        )
+        self.backward = Graph(
+            problem.out_start, problem.arc_to[out], problem.arc_steps[out], out, coarse, bits, cell_of, back
+        )
+
+    def binds(self, group: int) -> bool:
+        """Return whether the battery of a class can bind, so that labels carry it."""
+        return bool(np.isfinite(self._fuel[group][0].budget))
+
+    def prices(self, group: int, duals: Duals, side: SidePrices, cuts: Sequence[SubsetRow]) -> tuple[Prices, Prices]:
+        """Return the prices of one class in both directions of time."""
+        problem, data = self.problem, self.problem.classes[group]
+        gain = problem.reward.T - (problem.sigma * data.sense_j + duals.cell)[None, :]
+        if side.sense is not None:
+            gain = gain - side.sense[:, None]
+        instant = np.arange(problem.horizon + 1)[:, None]
+        if side.first is not None and side.last is not None:
+            gain = np.where((instant < side.first) | (instant > side.last), NEVER, gain)
+        gain[: max(1, data.start_step)] = NEVER
+        gain[problem.sigma * data.sense_j >= problem.reward.T] = NEVER
+        stand = self._no_stand if side.stand is None else side.stand
+        arc_cost, wait_cost = problem.sigma * problem.arc_energy_j, problem.sigma * data.wait_j
+        priced = tuple(duals.cut)
+        ahead = self._prices(gain, stand, arc_cost, wait_cost, cuts, priced)
+        back = self._prices(gain[::-1], stand[::-1], arc_cost, wait_cost, cuts, priced)
+        return ahead, back
+
+    def price(
+        self,
+        duals: Duals,
+        side: SidePrices = NO_SIDE_PRICES,
+        cuts: Sequence[SubsetRow] = (),
+        *,
+        width: int | None = None,
+        columns: int = 10,
+        groups: Sequence[int] | None = None,
+        floor: FloatArray | None = None,
+        max_labels: int = MAX_LABELS,
+    ) -> Priced:
+        """Return routes whose value exceeds their prices.
+
+        Parameters
+        ----------
+        duals
+            Multipliers of the master.
+        side
+            Prices of coupling limits and what branching forbids.
+        cuts
+            The cuts that ``duals.cut`` prices.
+        width
+            Labels kept per cell and instant: a heuristic call. None prices exactly.
+        columns
+            Most columns returned per class.
+        groups
+            Classes to price, all by default.
+        floor
+            ``(n_classes,)`` values minus prices below which nothing is of interest; the group multipliers by
+            default.
+        max_labels
+            Labels per class beyond which an exact call is given up.
+        """
+        found: list[Column] = []
+        exact = width is None
+        best = np.full(len(self.problem.classes), np.inf)
+        tops = np.full(len(self.problem.classes), -np.inf)
+        floor = duals.group if floor is None else floor
+        for group in range(len(self.problem.classes)) if groups is None else groups:
+            ahead, back = self.prices(group, duals, side, cuts)
+            data = self.problem.classes[group]
+            bound = self._rest(group, ahead, back)
+            cutoff = float(floor[group]) - self._constant(group)
+            labels, complete = grow_labels(
+                self.forward,
+                ahead,
+                self._fuel[group][0],
+                self._origin[group],
+                data.start_step,
+                bound,
+                self._no_labels,
+                cutoff,
+                MAX_LABELS if width is None else width,
+                max_labels,
+                True,
+            )
+            chosen, top = self._finals(labels, group, columns)
+            found += [self.column(group, labels, label, cell) for label, cell in chosen]
+            exact &= complete
+            best[group] = max(cutoff, top) + self._constant(group)
+            tops[group] = top + self._constant(group) if chosen else -np.inf
+        return Priced(found, best if exact else None, tops)
+
+    def completions(
+        self,
+        group: int,
+        duals: Duals,
+        floor: float,
+        side: SidePrices,
+        cuts: Sequence[SubsetRow],
+        max_labels: int,
+    ) -> tuple[Prices, FloatArray, Labels | None, float]:
+        """Return what bounds every single label of a class: prices, flat bound, labels from the horizon, cutoff.
+
+        Parameters
+        ----------
+        group, duals, side, cuts
+            The class and its prices.
+        floor
+            Least value minus prices of interest, the group's multiplier not deducted.
+        max_labels
+            Labels beyond which the labels from the horizon are None.
+        """
+        ahead, back = self.prices(group, duals, side, cuts)
+        cutoff = floor - self._constant(group)
+        bound = self._rest(group, ahead, back)
+        past = flat_values(self.forward, ahead, self._origin[group], self.problem.classes[group].start_step, True)[
+            ::-1
+        ].copy()
+        if len(back.stand) > 1:
+            past = np.where(past > NEVER, past + back.stand, past)
+        labels, complete = grow_labels(
+            self.backward,
+            back,
+            self._fuel[group][1],
+            self._finish[group],
+            0,
+            past,
+            self._no_labels,
+            cutoff,
+            MAX_LABELS,
+            max_labels,
+            False,
+        )
+        return ahead, bound, labels if complete else None, cutoff
+
+    def fuel(self, group: int) -> Fuel:
+        """Return the battery of a class as a resource, forwards in time."""
+        return self._fuel[group][0]
+
+    def _rest(self, group: int, ahead: Prices, back: Prices) -> FloatArray:
+        """Return ``(T + 1, n)``: bound on what a route still earns from its arrival in a cell."""
+        bound = flat_values(self.backward, back, self._finish[group], 0, True)[::-1].copy()
+        if len(ahead.stand) > 1:
+            bound = np.where(bound > NEVER, bound + ahead.stand, bound)
+        return bound
+
+    def column(self, group: int, labels: Labels, label: int, cell: int) -> Column:
+        """Return the route of a label that stands in ``cell`` at the horizon."""
+        problem, data = self.problem, self.problem.classes[group]
+        cells, arcs, senses = trace(labels, problem.arc_from, problem.arc_steps, label, cell, problem.horizon)
+        return route_column(
+            problem,
+            Route(
+                group,
+                cells[data.start_step :],
+                arcs[data.start_step :],
+                senses[data.start_step :],
+                np.zeros(problem.horizon + 1 - data.start_step),
+            ),
+        )
+
+    def allowed_end(self, group: int, labels: Labels) -> NDArray[np.bool_]:
+        """Return for each label at the horizon whether the class may end there."""
+        last = labels.start[self.problem.horizon * self.problem.n_cells :]
+        cell = np.searchsorted(last, np.arange(last[0], last[-1]), side="right") - 1
+        allowed: NDArray[np.bool_] = self._finish[group][cell] > NEVER
+        return allowed
+
+    def _constant(self, group: int) -> float:
+        """Return what the labels leave out: the weighted battery at the start."""
+        return self.problem.sigma * self.problem.classes[group].battery_j
+
+    def _finals(self, labels: Labels, group: int, count: int) -> tuple[list[tuple[int, int]], float]:
+        """Return (label, cell) of the best labels at the horizon, and the best value."""
+        n, horizon = self.problem.n_cells, self.problem.horizon
+        first, beyond = int(labels.start[horizon * n]), int(labels.start[(horizon + 1) * n])
+        cell = np.searchsorted(labels.start[horizon * n :], np.arange(first, beyond), side="right") - 1
+        allowed = self.allowed_end(group, labels)
+        label, cell = np.arange(first, beyond)[allowed], cell[allowed]
+        if len(label) == 0:
+            return [], NEVER
+        order = np.argsort(-labels.value[label], kind="stable")[:count]
+        return [(int(label[k]), int(cell[k])) for k in order], float(labels.value[label[order[0]]])
+
+    def _prices(
+        self,
+        gain: FloatArray,
+        stand: FloatArray,
+        arc_cost: FloatArray,
+        wait_cost: float,
+        cuts: Sequence[SubsetRow],
+        cut_price: Sequence[float],
+    ) -> Prices:
+        """Return prices in kernel time."""
+        n = self.problem.n_cells
+        best_gain = np.zeros((len(gain) + 1, n))
+        best_gain[:-1] = np.maximum.accumulate(np.maximum(gain, 0.0)[::-1])[::-1]
+        cut_of = np.zeros(n, dtype=np.uint64)
+        cut_keep = np.full(n, 0, dtype=np.uint64)
+        for k, cut in enumerate(cuts):
+            bit = np.uint64(1) << np.uint64(k)
+            cut_of[list(cut.cells)] |= bit
+            cut_keep[list(cut.memory)] |= bit
+        price = np.zeros(64)
+        price[: len(cut_price)] = cut_price
+        return Prices(
+            np.ascontiguousarray(gain),
+            best_gain,
+            np.ascontiguousarray(stand),
+            arc_cost,
+            float(wait_cost),
+            cut_of,
+            cut_keep,
+            price,
+        )
+
+
+def route_column(problem: RouteProblem, route: Route) -> Column:
+    """Return the column of a route: its cells in order of collection and its exact value.
+
+    Parameters
+    ----------
+    problem
+        The route problem.
+    route
+        A route; sensing the same cell twice counts twice (a relaxation that only pricing produces).
+    """
+    data = problem.classes[route.robot_class]
+    instants = np.arange(data.start_step, problem.horizon + 1)
+    sensed = route.cell[route.sense]
+    coverage = float(problem.reward[sensed, instants[route.sense]].sum())
+    return Column(
+        route.robot_class,
+        coverage + problem.sigma * end_battery(problem, route),
+        tuple(int(c) for c in sensed),
+        route,
+    )
+
+
+def end_battery(problem: RouteProblem, route: Route) -> float:
+    """Return the battery at the horizon after a route, J."""
+    data = problem.classes[route.robot_class]
+    started = route.arc[route.arc >= 0]
+    waits = len(route.cell) - 1 - int(problem.arc_steps[started].sum())
+    spent = float(problem.arc_energy_j[started].sum()) + waits * data.wait_j
+    return data.battery_j - spent - data.sense_j * int(route.sense.sum()) + float(route.charge_j.sum())
+
+
+def _no_labels() -> Labels:
+    """Return labels of length 0."""
+    none = np.zeros(0, dtype=np.int64)
+    bits: NDArray[np.uint64] = np.zeros(0, dtype=np.uint64)
+    return Labels(np.zeros(1, dtype=np.int64), np.zeros(0), bits, bits, np.zeros(0), none, none, np.zeros(0, np.bool_))
