@@ -109,7 +109,8 @@ class Roadmap:
             near = np.asarray(near, dtype=np.int64).reshape(n, -1)
             point, node, _ = join(stand, drive, points, self.nodes, near, _JOINED)
             edges.append(np.stack((point, node + n), axis=1))
-        pairs = np.unique(np.sort(np.concatenate(edges), axis=1), axis=0)
+        low, high = np.sort(np.concatenate(edges), axis=1).T
+        pairs = np.stack(np.divmod(np.unique(low * len(nodes) + high), len(nodes)), axis=1)
         lengths = np.hypot(*(nodes[pairs[:, 0]] - nodes[pairs[:, 1]]).T)
         both = np.concatenate((pairs, pairs[:, ::-1]))
         weights = np.maximum(np.concatenate((lengths, lengths)), 1e-12)  # 0 would be no edge
