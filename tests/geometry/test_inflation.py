@@ -124,7 +124,8 @@ def test_why_a_point_is_out_of_reach_and_where_the_nearest_is() -> None:
     assert "inside an obstacle" in str(space.why_not((13.5, 1.5)))
     assert "unknown" in str(space.why_not((16.5, 1.5)))
     assert "0.500 m from an obstacle, less than the footprint's 0.600 m" in str(space.why_not((10.5, 0.5)))
-    assert space.nearest_free_point((10.5, 0.5)) is None  # three rows with 0.6 m to each side: nowhere
+    np.testing.assert_allclose(space.nearest_free_point((10.5, 0.5)), (11.5, 1.5))  # a whole metre from all walls
+    assert inflate(map_, Footprint(1.6)).nearest_free_point((10.5, 0.5)) is None  # the room is 3 m wide
     wide = inflate(map_, Footprint(0.2), unknown="free", refine=1)
     assert wide.why_not((10.5, 0.5)) is None
     np.testing.assert_allclose(wide.nearest_free_point((10.5, 0.5)), (10.5, 0.5))
