@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from react_opt.models.program import Program
 from react_opt.solvers.backend import Abilities
 from react_opt.solvers.highs_model import TOLERANCE, to_highs, write_model
-from react_opt.solvers.outcome import Limit, Outcome, Request
-from react_opt.solvers.verdict import Claim
-from react_opt.solvers.watchdog import Watch, supervise
+from react_opt.solvers.outcome import Claim, Limit, Outcome, Request
+from react_opt.solvers.watch import Watch
+from react_opt.solvers.watchdog import supervise
 
 __all__ = ["HighsBackend", "to_highs", "write_model"]
 
@@ -66,12 +66,13 @@ def _run(program: Program, request: Request, watch: Watch) -> Claim:
     if remaining_s is not None:
         highs.setOptionValue("time_limit", remaining_s)
     _listen(highs, watch)
+    _obey(highs, watch)
     try:
         highs.run()
         status = highs.getModelStatus()
         claim = Claim("no_solution", limit=_LIMITS.get(status, "none"), settings=settings)
         if status == _Status.kUnboundedOrInfeasible:
-            status = _tell_apart(highs, program, watch)
+            status = _tell_apart(program, watch)
         if status in (_Status.kOptimal, _Status.kModelEmpty):
             claim.status = "optimal"
         elif status == _Status.kInfeasible:
@@ -105,33 +106,35 @@ def _settings(request: Request, mixed: bool) -> dict[str, Any]:
 
 
 def _listen(highs: highspy.Highs, watch: Watch) -> None:
-    """Record incumbents and bounds as HiGHS tells them, and pass a stop on to it."""
+    """Record incumbents and bounds as HiGHS tells them."""
 
     def improved(event: Any) -> None:
         watch.found(event.data_out.mip_solution, event.data_out.objective_function_value)
         watch.proved(event.data_out.mip_dual_bound)
 
-    def polled(event: Any) -> None:
-        watch.proved(event.data_out.mip_dual_bound)
-        if watch.stopped():
-            event.interrupt()
-
-    def polled_lp(event: Any) -> None:
-        if watch.stopped():
-            event.interrupt()
-
     highs.cbMipImprovingSolution.subscribe(improved)
-    highs.cbMipInterrupt.subscribe(polled)
-    highs.cbSimplexInterrupt.subscribe(polled_lp)
-    highs.cbIpmInterrupt.subscribe(polled_lp)
+    highs.cbMipInterrupt.subscribe(lambda event: watch.proved(event.data_out.mip_dual_bound))
 
 
-def _tell_apart(highs: highspy.Highs, program: Program, watch: Watch) -> Any:
-    """Return whether a program that HiGHS calls unbounded or infeasible is one or the other."""
+def _obey(highs: highspy.Highs, watch: Watch) -> None:
+    """Pass the order to stop on to HiGHS."""
+
+    def polled(event: Any) -> None:
+        if watch.stopped():
+            event.interrupt()
+
+    for callback in (highs.cbMipInterrupt, highs.cbSimplexInterrupt, highs.cbIpmInterrupt):
+        callback.subscribe(polled)
+
+
+def _tell_apart(program: Program, watch: Watch) -> Any:
+    """Return which of the two a program is that HiGHS calls unbounded or infeasible: does it hold without objective?"""
+    highs = to_highs(program, names=False)
     highs.changeColsCost(program.n_columns, np.arange(program.n_columns, dtype=np.int32), np.zeros(program.n_columns))
     remaining_s = watch.remaining_s()
     if remaining_s is not None:
-        highs.setOptionValue("time_limit", highs.getRunTime() + remaining_s)
+        highs.setOptionValue("time_limit", remaining_s)
+    _obey(highs, watch)
     highs.run()
     status = highs.getModelStatus()
     return _Status.kUnbounded if status == _Status.kOptimal else status

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+FloatArray = NDArray[np.float64]
 Status = Literal["optimal", "feasible", "infeasible", "no_solution"]
 Limit = Literal["time", "memory", "work", "interrupt", "none"]
 Progress = Callable[[float, float | None, float | None], None]  # elapsed_s, incumbent, bound
@@ -43,9 +44,38 @@ class Request:
     gap_abs: float = 0.0
     threads: int = 1
     seed: int = 0
-    start: NDArray[np.float64] | None = None
+    start: FloatArray | None = None
     on_progress: Progress | None = None
     should_stop: Callable[[], bool] | None = None
+
+
+@dataclass
+class Claim:
+    """What a solver says when it stops, in the program's own sense.
+
+    Parameters
+    ----------
+    status
+        ``optimal``, ``infeasible`` or ``unbounded`` where it says it has proven that, else ``no_solution``;
+        whether there is a solution is told by ``x`` alone.
+    limit
+        The limit that it says stopped it.
+    x
+        Its best solution, or None.
+    bound
+        Its proven bound, or None.
+    settings
+        The settings it was given beyond its defaults.
+    notes
+        What the user should know.
+    """
+
+    status: Literal["optimal", "infeasible", "unbounded", "no_solution"]
+    limit: Limit = "none"
+    x: FloatArray | None = None
+    bound: float | None = None
+    settings: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -65,7 +95,8 @@ class Outcome:
     solver, version
         What solved it.
     settings
-        The settings it was given beyond its defaults, and notes (integer scaling, refused warm start).
+        The settings it was given beyond its defaults (integer scaling among them), and under ``notes`` a list of
+        lines that the user should know (a start that was not used, a solution that was not believed).
     wall_s
         Seconds spent.
     """
@@ -74,7 +105,7 @@ class Outcome:
     limit: Limit
     solver: str
     version: str
-    x: NDArray[np.float64] | None = None
+    x: FloatArray | None = None
     objective: float | None = None
     bound: float | None = None
     settings: dict[str, Any] = field(default_factory=dict)

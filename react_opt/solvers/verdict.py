@@ -2,50 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.models.program import Program
 from react_opt.solvers.highs_model import completed
-from react_opt.solvers.outcome import Limit, Outcome, Request, Status
+from react_opt.solvers.outcome import Claim, Limit, Outcome, Request, Status
 
 FloatArray = NDArray[np.float64]
 TOLERANCE = 1e-6
 """Largest violation of a row or bound at which a solution is believed."""
 _ROUNDING = 1e-9
-
-
-@dataclass
-class Claim:
-    """What a solver says when it stops, in the program's own sense.
-
-    Parameters
-    ----------
-    status
-        ``optimal``, ``infeasible`` or ``unbounded`` where it says it has proven that, else ``no_solution``;
-        whether there is a solution is told by ``x`` alone.
-    limit
-        The limit that it says stopped it.
-    x
-        Its best solution, or None.
-    bound
-        Its proven bound, or None.
-    settings
-        The settings it was given beyond its defaults.
-    notes
-        What the user should know.
-    """
-
-    status: Literal["optimal", "infeasible", "unbounded", "no_solution"]
-    limit: Limit = "none"
-    x: FloatArray | None = None
-    bound: float | None = None
-    settings: dict[str, Any] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
 
 
 def conclude(

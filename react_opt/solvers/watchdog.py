@@ -5,74 +5,22 @@ from __future__ import annotations
 import atexit
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from react_opt.errors import UsageError
 from react_opt.models.program import Program
-from react_opt.solvers.outcome import Limit, Outcome, Request
-from react_opt.solvers.verdict import Claim, conclude
+from react_opt.solvers.outcome import Claim, Limit, Outcome, Request
+from react_opt.solvers.verdict import conclude
+from react_opt.solvers.watch import Watch
 
-FloatArray = NDArray[np.float64]
 _POLL_S = 0.02
 _PROGRESS_S = 0.1
 _INTERRUPT_GRACE_S = 1.0
 _EXIT_GRACE_S = 5.0
 _stray: list[threading.Thread] = []
-
-
-@dataclass
-class Watch:
-    """What the thread of a solver shares with the thread that waits for it.
-
-    Parameters
-    ----------
-    maximise
-        Sense of the program.
-    deadline
-        ``perf_counter()`` at which the solver has to stop; None for none.
-    """
-
-    maximise: bool
-    deadline: float | None = None
-    x: FloatArray | None = None
-    objective: float | None = None
-    bound: float | None = None
-    reason: Literal["time", "interrupt"] | None = None
-    _lock: threading.Lock = field(default_factory=threading.Lock)
-
-    def stop(self, reason: Literal["time", "interrupt"]) -> None:
-        """Ask the solver to stop; the first reason counts."""
-        self.reason = self.reason or reason
-
-    def stopped(self) -> bool:
-        """Whether the solver has to stop; solvers poll it."""
-        if self.reason is None and self.deadline is not None and perf_counter() >= self.deadline:
-            self.stop("time")
-        return self.reason is not None
-
-    def remaining_s(self) -> float | None:
-        """Seconds left, not negative; None for no limit."""
-        return None if self.deadline is None else max(0.0, self.deadline - perf_counter())
-
-    def found(self, x: FloatArray, objective: float) -> None:
-        """Record a solution and its value; the best one is kept."""
-        with self._lock:
-            sign = 1.0 if self.maximise else -1.0
-            if self.objective is None or sign * objective > sign * self.objective:
-                self.x, self.objective = np.array(x, dtype=np.float64), float(objective)
-
-    def proved(self, bound: float) -> None:
-        """Record a proven bound; the tightest one is kept, what is not finite says nothing."""
-        if not np.isfinite(bound):
-            return
-        with self._lock:
-            pick = min if self.maximise else max
-            self.bound = float(bound) if self.bound is None else pick(self.bound, float(bound))
 
 
 def supervise(

@@ -1,0 +1,70 @@
+"""What a running solver shares with whoever waits for it: the order to stop, and the best it has found."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class Watch:
+    """What the thread of a solver shares with the thread that waits for it.
+
+    Parameters
+    ----------
+    maximise
+        Sense of the program.
+    deadline
+        ``perf_counter()`` at which the solver has to stop; None for none.
+    on_stop
+        Called once by :meth:`stop`, for solvers that are told rather than asked.
+    """
+
+    maximise: bool
+    deadline: float | None = None
+    x: FloatArray | None = None
+    objective: float | None = None
+    bound: float | None = None
+    reason: Literal["time", "interrupt"] | None = None
+    on_stop: Callable[[], None] | None = None
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def stop(self, reason: Literal["time", "interrupt"]) -> None:
+        """Ask the solver to stop; the first reason counts."""
+        if self.reason is None:
+            self.reason = reason
+            if self.on_stop is not None:
+                self.on_stop()
+
+    def stopped(self) -> bool:
+        """Whether the solver has to stop; solvers poll it."""
+        if self.reason is None and self.deadline is not None and perf_counter() >= self.deadline:
+            self.stop("time")
+        return self.reason is not None
+
+    def remaining_s(self) -> float | None:
+        """Seconds left, not negative; None for no limit."""
+        return None if self.deadline is None else max(0.0, self.deadline - perf_counter())
+
+    def found(self, x: FloatArray, objective: float) -> None:
+        """Record a solution and its value; the best one is kept."""
+        with self._lock:
+            sign = 1.0 if self.maximise else -1.0
+            if self.objective is None or sign * objective > sign * self.objective:
+                self.x, self.objective = np.array(x, dtype=np.float64), float(objective)
+
+    def proved(self, bound: float) -> None:
+        """Record a proven bound; the tightest one is kept, what is not finite says nothing."""
+        if not np.isfinite(bound):
+            return
+        with self._lock:
+            pick = min if self.maximise else max
+            self.bound = float(bound) if self.bound is None else pick(self.bound, float(bound))
