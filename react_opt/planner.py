@@ -89,7 +89,9 @@ def solve(
         should_stop=should_stop,
         **({} if threads is None else {"threads": threads}),
     )
-    return method_of(instance, options, start, at_step)
+    if isinstance(instance, OrosInstance):
+        return method_of(instance, options, start, at_step)
+    return method_of(instance, options, start)
 
 
 def _solver_of(instance: Any) -> Callable[..., Any]:

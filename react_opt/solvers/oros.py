@@ -19,12 +19,15 @@ from react_opt.replan import Frozen, freeze
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.monolith import solve_monolith
 from react_opt.solvers.outcome import Request
+from react_opt.solvers.routes.engine import solve_routes, unpriced
 from react_opt.solvers.routes.greedy import InfeasibleRobot, greedy
+from react_opt.solvers.routes.search import improve
 from react_opt.timegraph import route_problem
 
 MAX_ENTRIES = 150_000_000  # cells x steps of the reward profile: about 5 GB while it is built
 MAX_PLAN_STEPS = 5_000_000  # rows of a plan file
 MAX_COLUMNS = 4_000_000  # of the monolith
+IMPROVE_S, IMPROVE_SHARE, IMPROVE_WORK = 1.0, 0.05, 20  # primal search before the monolith
 
 
 @dataclass
@@ -145,16 +148,64 @@ def _proven(search: Search) -> bool:
 def _choose(search: Search) -> Any:
     """Return the method that fits, and note why where the choice was forced."""
     options = search.options
-    if options.method == "routes" and options.solver not in (None, "highs"):
-        raise UsageError(f"solver: the method routes works with highs, not with {options.solver!r}")
+    unpriced_because = unpriced(search.problem)
+    if options.method == "routes":
+        if options.solver not in (None, "highs"):
+            raise UsageError(f"solver: the method routes works with highs, not with {options.solver!r}")
+        if unpriced_because is not None:
+            raise UsageError(f"method: {unpriced_because}; expected auto or monolith")
+        search.method = "routes: asked for"
+        return _routes
     if options.method == "monolith":
         search.method = "monolith: asked for"
-        return _monolith
-    if options.solver is not None and options.method == "auto":
-        search.method = f"monolith: solver {options.solver} was asked for"
-        return _monolith
-    search.method = "monolith"
+    elif options.solver is not None:
+        search.method = f"monolith: the solver {options.solver} was asked for"
+    elif unpriced_because is not None:
+        search.method = f"monolith: {unpriced_because}"
+    else:
+        search.method = "routes"
+        return _routes
     return _monolith
+
+
+def _routes(search: Search) -> None:
+    """Solve by the decomposition; with fixed first steps, the rest is a problem of its own."""
+    options, known, frozen = search.options, search.best, search.frozen
+    problem = search.problem if frozen is None else frozen.problem
+    earned = 0.0 if frozen is None else frozen.earned
+    start = None if known is None else known[1] if frozen is None else frozen.rest(known[1])
+    shift = earned + search.constant
+
+    def progress(elapsed_s: float, incumbent: float | None, bound: float | None) -> None:
+        search.progress(
+            elapsed_s, None if incumbent is None else incumbent + shift, None if bound is None else bound + shift
+        )
+
+    deadline = options.deadline
+    result = solve_routes(
+        problem,
+        deadline=None if deadline is None else deadline - _check_reserve_s(search),
+        work_limit=options.work_limit,
+        gap=options.gap,
+        threads=options.threads,
+        seed=options.seed,
+        start=start,
+        on_progress=progress,
+        should_stop=options.should_stop,
+    )
+    search.solver, search.limit = "highs", result.limit
+    search.packages = (*search.packages, "highspy")
+    search.settings["work"] = result.iterations
+    if result.notes:
+        search.settings["notes"] = list(result.notes)
+    if result.routes is not None:
+        search.offer(result.routes if frozen is None else frozen.whole(result.routes))
+    if result.bound is not None:
+        if result.bound + earned < search.bound and frozen is None:
+            search.certificate = result.certificate or None
+        search.bound = min(search.bound, result.bound + earned)
+    if result.status == "infeasible" and known is None:
+        search.infeasible = f"fleet: {'; '.join(result.notes)}"
 
 
 def _monolith(search: Search) -> None:
@@ -167,7 +218,8 @@ def _monolith(search: Search) -> None:
     if options.left_s() == 0.0:
         search.limit = "time"
         return
-    constant = search.constant
+    _improve(search)
+    known, constant = search.best, search.constant
     objective = None if known is None else known[0] + constant
     request = Request(
         time_limit_s=options.left_s(reserve_s=_check_reserve_s(search)),
@@ -192,6 +244,26 @@ def _monolith(search: Search) -> None:
         search.bound = min(search.bound, outcome.bound - constant)
     if outcome.status == "infeasible" and known is None:
         search.infeasible = f"fleet: the {solver} solver proved that no plan keeps all limits together"
+
+
+def _improve(search: Search) -> None:
+    """Give the monolith a better plan to start from, for a small part of the time or work there is."""
+    known, options = search.best, search.options
+    if known is None or search.frozen is not None:
+        return
+    left_s = options.left_s()
+    share_s = IMPROVE_S if left_s is None else min(IMPROVE_S, IMPROVE_SHARE * left_s)
+    steady = options.work_limit is not None
+    better = improve(
+        search.problem,
+        known[1],
+        deadline=None if steady else time.perf_counter() + share_s,
+        work_limit=IMPROVE_WORK if steady else None,
+        seed=options.seed,
+        should_stop=options.should_stop,
+    )
+    search.offer(better)
+    search.progress(0.0, None, None)
 
 
 def _check_reserve_s(search: Search) -> float:
