@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, Literal, NoReturn, TypeVar
 
 import typer
 from rich.console import Console
@@ -15,6 +16,10 @@ from react_opt.errors import InputError, MissingPartError, ReactError, UsageErro
 from react_opt.interrupt import Interruption
 
 OK, VIOLATED, BAD_INPUT, INFEASIBLE, NO_PLAN, INTERRUPTED = 0, 1, 2, 3, 4, 130
+
+T = TypeVar("T")
+PATH_KINDS: tuple[Literal["exact", "ompl"], ...] = ("exact", "ompl")
+UNKNOWN_SPACE: tuple[Literal["blocked", "free", "costlier"], ...] = ("blocked", "free", "costlier")
 
 app = typer.Typer(
     name="react-opt",
@@ -56,6 +61,18 @@ def main() -> NoReturn:
     sys.exit(code if isinstance(code, int) else OK)
 
 
+@app.callback(invoke_without_command=True)
+def version(
+    show: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Plan how battery-powered robots explore a building against the clock, with a proof of how good the plan is."""
+    if show:
+        import importlib.metadata
+
+        print(importlib.metadata.version("react_opt"))
+        raise typer.Exit
+
+
 @app.command()
 def build(
     map_file: Annotated[str, typer.Argument(metavar="MAP", help="ROS map YAML, or MovingAI .map.")],
@@ -64,6 +81,7 @@ def build(
     horizon_s: Annotated[float, typer.Option("--horizon-s", help="Time to plan for, s.")] = 240.0,
     step_s: Annotated[float, typer.Option("--step-s", help="Length of a step, s.")] = 10.0,
     paths: Annotated[str, typer.Option("--paths", help="Path costs: exact or ompl.")] = "exact",
+    unknown: Annotated[str, typer.Option("--unknown", help="Unknown space: blocked, free or costlier.")] = "blocked",
     output: Output = None,
     as_json: AsJson = False,
 ) -> int:
@@ -77,16 +95,24 @@ def build(
     from react_opt.report.tables import build_table
 
     report = build_instance(
-        load_map(map_file), load(fleet, "fleet"), cell_m=cell_m, horizon_s=horizon_s, step_s=step_s, paths=paths
+        load_map(map_file),
+        load(fleet, "fleet"),
+        cell_m=cell_m,
+        horizon_s=horizon_s,
+        step_s=step_s,
+        paths=_one_of("--paths", paths, PATH_KINDS),
+        unknown=_one_of("--unknown", unknown, UNKNOWN_SPACE),
+        map_file=map_file,
+        fleet_file=fleet,
     )
     if output is not None:
         save(report.instance, output)
     if as_json and output != "-":
         sys.stdout.write(dumps(report.instance))
-    elif output != "-":
-        Console().print(build_table(report))
-    for what, place, why in report.dropped:
-        print(f"dropped: {what} {place}: {why}", file=sys.stderr)
+    elif output is None:
+        Console().print(build_table(report.instance))
+    for line in [*report.notes, *map(str, report.dropped)]:
+        print(line, file=sys.stderr)
     return OK
 
 
@@ -113,15 +139,17 @@ def solve(
 
     Example: react-opt solve factory.json --time-limit 10 -o plan.json
     """
-    from react_opt.jsonio import dumps, load, save
+    from react_opt.jsonio import dumps, load, require_writable, save
     from react_opt.planner import solve as solve_instance
     from react_opt.report.live import live_line
-    from react_opt.report.tables import plan_table
+    from react_opt.report.tables import claim_line, plan_table
 
     if instance_file == start == "-":
         raise UsageError("--start: standard input is the instance already")
     instance = _instance(load(instance_file), instance_file)
     given = None if start is None else load(start)
+    if output is not None:
+        require_writable(output)
     with Interruption() as interruption, live_line() as progress:
         plan = solve_instance(
             instance,
@@ -141,8 +169,10 @@ def solve(
         save(plan, output)
     if as_json and output != "-":
         sys.stdout.write(dumps(plan))
-    elif output != "-":
+    elif output is None:
         Console().print(plan_table(instance, plan))
+    else:
+        print(f"{output}: {claim_line(plan.claim)}", file=sys.stderr)
     if plan.claim.reason:
         print(f"{instance_file}: {plan.claim.reason}", file=sys.stderr)
     if interruption.asked():
@@ -198,6 +228,13 @@ def solvers() -> int:
 
     Console().print(solvers_table())
     return OK
+
+
+def _one_of(option: str, value: str, allowed: Sequence[T]) -> T:
+    for item in allowed:
+        if item == value:
+            return item
+    raise UsageError(f"{option}: expected one of {', '.join(map(str, allowed))}, found {value!r}")
 
 
 def _instance(document: Any, file: str) -> Any:

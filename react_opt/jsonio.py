@@ -106,6 +106,25 @@ def write_text(text: str, path: str | os.PathLike[str]) -> None:
     write_bytes(text.encode(), path)
 
 
+def require_writable(path: str | os.PathLike[str]) -> None:
+    """Fail before long work rather than after it: ``path`` must be a file in a folder that can be written.
+
+    Raises
+    ------
+    InputError
+        Where it is not.
+    """
+    target = Path(path)
+    if os.fspath(path) == STANDARD:
+        return
+    if target.is_dir():
+        raise InputError.single(os.fspath(path), "", "cannot be written: is a directory")
+    if not target.parent.is_dir():
+        raise InputError.single(os.fspath(path), "", "cannot be written: its folder does not exist")
+    if not os.access(target.parent, os.W_OK):
+        raise InputError.single(os.fspath(path), "", "cannot be written: its folder is read-only")
+
+
 def write_bytes(content: bytes, path: str | os.PathLike[str]) -> None:
     """Write bytes to a temporary file beside ``path`` and rename it; see :func:`write_text`."""
     target = Path(path)
@@ -129,9 +148,7 @@ def write_bytes(content: bytes, path: str | os.PathLike[str]) -> None:
         if temporary:
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
-        raise InputError.single(
-            os.fspath(path), "", f"cannot be written: {error.strerror or error}"
-        ) from None
+        raise InputError.single(os.fspath(path), "", f"cannot be written: {error.strerror or error}") from None
 
 
 def sha256(document: Document) -> str:
@@ -191,17 +208,13 @@ def _decode(text: str, file: str) -> Any:
         data = json.loads(text, object_pairs_hook=unrepeated)
     except json.JSONDecodeError as error:
         place = f"line {error.lineno} column {error.colno}"
-        raise InputError.single(
-            file, place, f"expected JSON: {error.msg[:1].lower()}{error.msg[1:]}"
-        ) from None
+        raise InputError.single(file, place, f"expected JSON: {error.msg[:1].lower()}{error.msg[1:]}") from None
     except RecursionError:
         raise InputError.single(file, "", "expected JSON: nested too deeply") from None
     except ValueError as error:  # an integer of thousands of digits
         raise InputError.single(file, "", f"expected JSON: {error}") from None
     if repeated:
-        raise InputError(
-            [Fault(file, key, "expected each key once in an object") for key in dict.fromkeys(repeated)]
-        )
+        raise InputError([Fault(file, key, "expected each key once in an object") for key in dict.fromkeys(repeated)])
     return data
 
 

@@ -36,6 +36,34 @@ def plan_table(
     return Group(*parts)
 
 
+def claim_line(claim: Claim) -> str:
+    """Return a claim in one line."""
+    if claim.objective is None:
+        return claim.status
+    stopped = "" if claim.limit == "none" else f", stopped by {claim.limit}"
+    return (
+        f"{claim.status}, objective {shown(claim.objective, 4)}, bound {shown(claim.bound, 4)}, "
+        f"gap {percent(claim.gap)}{stopped}"
+    )
+
+
+def build_table(instance: OrosInstance) -> RenderableType:
+    """Return a summary of an instance: its size, and how its cells are joined."""
+    grid = Table.grid(padding=(0, 2))
+    modes = {(arc.from_, arc.to) for arc in instance.travel}
+    steps = [arc.steps for arc in instance.travel]
+    joules = [arc.energy_j for arc in instance.travel]
+    horizon_s = instance.horizon_steps * instance.step_s
+    grid.add_row("horizon", f"{instance.horizon_steps} steps of {instance.step_s:g} s ({horizon_s:g} s)")
+    grid.add_row("cells", str(len(instance.cells)))
+    spread = f", {min(steps)} to {max(steps)} steps, {min(joules):.1f} to {max(joules):.1f} J" if steps else ""
+    grid.add_row("travel arcs", f"{len(instance.travel)} between {len(modes)} pairs{spread}")
+    grid.add_row("robots", ", ".join(f"{robot.id} in {robot.start}" for robot in instance.robots))
+    if instance.chargers:
+        grid.add_row("chargers", ", ".join(charger.cell for charger in instance.chargers))
+    return Panel(grid, title=instance.name, expand=False)
+
+
 def solvers_table() -> RenderableType:
     """Return the solvers that are installed, with versions and abilities, and how to get the others."""
     table = Table(pad_edge=False)
@@ -66,7 +94,9 @@ def percent(gap: float | None) -> str:
     """Return a gap as a percentage with as many digits as it needs."""
     if gap is None:
         return "unknown"
-    return "0 %" if gap == 0 else f"{100 * gap:.2g} %" if gap < 0.1 else f"{100 * gap:.1f} %"
+    if gap < 1e-8:
+        return "0 %" if gap == 0 else "< 1e-6 %"
+    return f"{100 * gap:.2g} %" if gap < 0.1 else f"{100 * gap:.1f} %"
 
 
 def _claim_panel(name: str, claim: Claim) -> Panel:
