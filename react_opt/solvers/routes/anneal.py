@@ -1,10 +1,8 @@
-"""Simulated annealing over sequences: ruin and recreate by strings of cells, and exchanges of whole segments.
+"""Simulated annealing over sequences: segment moves, and ruin and recreate by strings of cells.
 
 The ruin removes short strings of cells around a random cell from several robots, and the recreation inserts them
-(and cells nobody senses) one by one where they add most, as in slack induction by string removals (Christiaens
-and Vanden Berghe, 2020). Segment moves make one cell follow another by reversing, moving or swapping tails, as in
-local search for minimum latency problems. Every move is valued by reading the changed sequences in full, so any
-reward profile works.
+(and cells nobody senses) one by one where they add most, as in slack induction by string removals (Christiaens and
+Vanden Berghe, 2020).
 """
 
 from __future__ import annotations
@@ -13,206 +11,123 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
+from react_opt.solvers.routes.moves import (
+    Order,
+    RandomState,
+    State,
+    Tables,
+    draw,
+    join,
+    keep,
+    read,
+    reverse,
+    shift,
+    skip,
+    swap_tails,
+)
 from react_opt.solvers.routes.problem import FloatArray, IntArray
-from react_opt.solvers.routes.sequences import Steps
 
-Order = NDArray[np.int32]
 _DELAYS = 8  # delays whose loss is tabulated
-_RUIN_SHARE = 0.08  # share of iterations that ruin and recreate; they cost some fifty times as much
-_BLINK = 0.02
-_STRING = 10  # longest string removed
+_BLINK = 0.02  # share of positions that an insertion overlooks
+_STRING = 10  # longest string usually removed
+_REACH = 12  # nearest cells that a segment move chooses from
 
 
 @kernel(nogil=True)
-def draw(state: NDArray[np.uint64]) -> float:
-    """Next uniform number in [0, 1) of a xorshift generator whose state is ``(1,)`` and not zero."""
-    x = state[0]
-    x ^= x >> np.uint64(12)
-    x ^= x << np.uint64(25)
-    x ^= x >> np.uint64(27)
-    state[0] = x
-    uniform: float = (x * np.uint64(2685821657736338717) >> np.uint64(11)) / 9007199254740992.0
-    return uniform
+def _state(robots: int, n_cells: int) -> State:
+    return State(
+        np.zeros((robots, n_cells), dtype=np.int32),
+        np.zeros(robots, dtype=np.int64),
+        np.zeros((robots, n_cells), dtype=np.int32),
+        np.zeros(robots),
+        np.full(n_cells, -1, dtype=np.int32),
+        np.zeros(n_cells, dtype=np.int32),
+        np.zeros((robots, n_cells + 1)),
+        np.zeros((robots, n_cells + 1)),
+    )
 
 
 @kernel(nogil=True)
-def read(
-    r: int,
-    order: Order,
-    lengths: IntArray,
-    arrival: Steps,
-    owner: Order,
-    horizon: int,
-    reward: FloatArray,
-    sigma: float,
-    steps: Steps,
-    energy_j: FloatArray,
-    whole: IntArray,
-    joules: FloatArray,
-) -> float:
-    """Read the sequence of robot r: drop what it cannot serve, set arrivals and owners, return its value.
-
-    The value is coverage less sigma times all the energy spent until the horizon.
-
-    Parameters
-    ----------
-    r
-        Robot.
-    order, lengths, arrival, owner
-        State: ``(n_robots, n_cells)`` sequences, their lengths, arrivals; ``(n_cells,)`` robot of each cell or -1.
-    horizon, reward, sigma
-        See `RouteProblem`.
-    steps, energy_j, whole, joules
-        See `SequenceModel`.
-    """
-    at, t, back = whole[r, 0], whole[r, 1], whole[r, 2]
-    spare_j, wait_j, sense_j = joules[r, 0], joules[r, 1], joules[r, 2]
-    spent, value, kept = 0.0, 0.0, 0
-    for k in range(lengths[r]):
-        cell = order[r, k]
-        then = t + steps[at, cell]
-        idle = 0.0
-        if then < 1:
-            then, idle = 1, wait_j
-        owner[cell] = -1
-        if then > horizon:
-            continue
-        earned = reward[cell, then] - sigma * sense_j
-        if reward[cell, then] <= 0.0 or earned <= 0.0:
-            continue
-        after = spent + energy_j[at, cell] + idle + sense_j
-        rest = horizon - then
-        if back >= 0:
-            rest -= steps[cell, back]
-            if rest < 0:
-                continue
-            if after + energy_j[cell, back] + rest * wait_j > spare_j:
-                continue
-        elif after + rest * wait_j > spare_j:
-            continue
-        owner[cell] = r
-        order[r, kept] = cell
-        arrival[r, kept] = then
-        kept += 1
-        value += reward[cell, then]
-        spent, at, t = after, cell, then
-    lengths[r] = kept
-    rest = horizon - t
-    if back >= 0:
-        spent += energy_j[at, back]
-        rest -= steps[at, back]
-    return value - sigma * (spent + rest * wait_j)
-
-
-@kernel(nogil=True)
-def _tabulate(
-    r: int, order: Order, lengths: IntArray, arrival: Steps, horizon: int, reward: FloatArray, loss: FloatArray
-) -> None:
+def _tabulate(r: int, s: State, tables: Tables, loss: FloatArray) -> None:
     """``loss[r, k, d]``: coverage lost when everything from position k on comes d steps later."""
-    length = lengths[r]
-    for d in range(loss.shape[2]):
-        total = 0.0
-        loss[r, length, d] = 0.0
-        for k in range(length - 1, -1, -1):
-            cell, t = order[r, k], arrival[r, k]
-            total += reward[cell, t]
+    horizon, reward, length = tables.horizon, tables.reward, s.lengths[r]
+    loss[r, length, :] = 0.0
+    for k in range(length - 1, -1, -1):
+        cell, t = s.order[r, k], s.arrival[r, k]
+        for d in range(loss.shape[2]):
+            now = 0.0
             if t + d <= horizon and reward[cell, t + d] > 0.0:
-                total -= reward[cell, t + d]
-            loss[r, k, d] = total
+                now = reward[cell, t + d]
+            loss[r, k, d] = loss[r, k + 1, d] + reward[cell, t] - now
 
 
 @kernel(nogil=True)
-def _insert(
-    cell: int,
-    order: Order,
-    lengths: IntArray,
-    arrival: Steps,
-    horizon: int,
-    reward: FloatArray,
-    sigma: float,
-    steps: Steps,
-    back_steps: Steps,
-    energy_j: FloatArray,
-    whole: IntArray,
-    joules: FloatArray,
-    loss: FloatArray,
-    state: NDArray[np.uint64],
-) -> int:
+def _insert(cell: int, s: State, tables: Tables, loss: FloatArray, random: RandomState) -> int:
     """Insert a cell where it adds most (positions are missed now and then); the robot, or -1 if nowhere."""
+    horizon, reward, sigma = tables.horizon, tables.reward, tables.sigma
+    steps, back_steps, energy_j = tables.steps[cell], tables.back_steps[cell], tables.energy_j
     best, best_r, best_k = 0.0, -1, -1
     top = loss.shape[2] - 1
-    for r in range(len(lengths)):
-        length = lengths[r]
-        at, t = whole[r, 0], whole[r, 1]
-        wait_j, sense_j = joules[r, 1], joules[r, 2]
+    for r in range(len(s.lengths)):
+        length = s.lengths[r]
+        at, t = tables.whole[r, 0], tables.whole[r, 1]
+        wait_j, sense_j = tables.joules[r, 1], tables.joules[r, 2]
         for k in range(length + 1):
             if k > 0:
-                at, t = order[r, k - 1], arrival[r, k - 1]
-            then = max(1, t + back_steps[cell, at])
+                at, t = s.order[r, k - 1], s.arrival[r, k - 1]
+            then = max(1, t + back_steps[at])
             if then > horizon:
                 continue
             gain = reward[cell, then] - sigma * sense_j
             if gain <= best:
                 continue
-            delay = 0
             if k < length:
-                delay = then + steps[cell, order[r, k]] - arrival[r, k]
+                following = s.order[r, k]
+                delay = then + steps[following] - s.arrival[r, k]
+                if gain - loss[r, k, min(delay, top)] <= best:
+                    continue
                 if delay <= top:
                     gain -= loss[r, k, delay]
                 else:
-                    gain -= loss[r, k, top]
-                    if gain <= best:
-                        continue
-                    gain += loss[r, k, top]
                     for q in range(k, length):
-                        other, late = order[r, q], arrival[r, q] + delay
-                        gain -= reward[other, arrival[r, q]]
+                        other, late = s.order[r, q], s.arrival[r, q] + delay
+                        gain -= reward[other, s.arrival[r, q]]
                         if late <= horizon and reward[other, late] > 0.0:
                             gain += reward[other, late]
-                if gain <= best:
-                    continue
-                following = order[r, k]
+                        if gain <= best:
+                            break
                 added = energy_j[at, cell] + energy_j[cell, following] - energy_j[at, following] - delay * wait_j
-                gain -= sigma * added
             else:
-                gain -= sigma * (energy_j[at, cell] - (then - t) * wait_j)
-            if gain > best and draw(state) >= _BLINK:
+                added = energy_j[at, cell] - (then - t) * wait_j
+            gain -= sigma * added
+            if gain > best and draw(random) >= _BLINK:
                 best, best_r, best_k = gain, r, k
     if best_r >= 0:
-        for k in range(lengths[best_r], best_k, -1):
-            order[best_r, k] = order[best_r, k - 1]
-        order[best_r, best_k] = cell
-        lengths[best_r] += 1
+        for k in range(s.lengths[best_r], best_k, -1):
+            s.order[best_r, k] = s.order[best_r, k - 1]
+        s.order[best_r, best_k] = cell
+        s.lengths[best_r] += 1
     return best_r
 
 
 @kernel(nogil=True)
-def _ruin(
-    order: Order,
-    lengths: IntArray,
-    arrival: Steps,
-    owner: Order,
-    near: Order,
-    removed: Order,
-    touched: NDArray[np.bool_],
-    state: NDArray[np.uint64],
-) -> int:
+def _ruin(s: State, tables: Tables, removed: Order, touched: NDArray[np.bool_], random: RandomState) -> int:
     """Take strings out around a random cell, unserved cells nearby too; returns how many ``removed`` now holds."""
-    n_cells = len(owner)
-    seed = int(draw(state) * n_cells)
-    most = _STRING if draw(state) < 0.9 else 3 * _STRING
-    strings = 1 + int(draw(state) * 4.0)
-    wish = 1 + int(draw(state) * 10.0)
+    near = tables.near
+    seed = int(draw(random) * len(s.owner))
+    longest = _STRING if draw(random) < 0.9 else 3 * _STRING
+    strings = 1 + int(draw(random) * 4.0)
+    wish = 1 + int(draw(random) * 10.0)
     count, taken, extra = 0, 0, 0
-    for position in range(-1, near.shape[1]):
-        cell = seed if position < 0 else near[seed, position]
+    for place in range(-1, near.shape[1]):
+        cell = seed if place < 0 else near[seed, place]
         if cell < 0:
             break
-        r = owner[cell]
+        r = s.owner[cell]
         if r == -1:
             if extra < wish:
                 removed[count] = cell
-                owner[cell] = -2  # in hand
+                s.owner[cell] = -2
                 count += 1
                 extra += 1
             continue
@@ -220,98 +135,66 @@ def _ruin(
             continue
         touched[r] = True
         taken += 1
-        where = 0
-        while order[r, where] != cell:
-            where += 1
-        size = min(1 + int(draw(state) * most), lengths[r])
-        first = max(0, min(where - int(draw(state) * size), lengths[r] - size))
+        size = min(1 + int(draw(random) * longest), s.lengths[r])
+        first = max(0, min(s.position[cell] - int(draw(random) * size), s.lengths[r] - size))
         for k in range(first, first + size):
-            removed[count] = order[r, k]
-            owner[order[r, k]] = -2
+            removed[count] = s.order[r, k]
+            s.owner[s.order[r, k]] = -2
             count += 1
-        for k in range(first, lengths[r] - size):
-            order[r, k] = order[r, k + size]
-        lengths[r] -= size
+        for k in range(first, s.lengths[r] - size):
+            s.order[r, k] = s.order[r, k + size]
+        s.lengths[r] -= size
     return count
 
 
 @kernel(nogil=True)
-def _segment_move(
-    order: Order,
-    lengths: IntArray,
-    owner: Order,
-    near: Order,
-    touched: NDArray[np.bool_],
-    spare: Order,
-    state: NDArray[np.uint64],
-    old_order: Order,
-) -> bool:
-    """Make a random cell follow one near it, by one of several moves; False when there is none to make.
+def _recreate(
+    s: State, tables: Tables, removed: Order, touched: NDArray[np.bool_], loss: FloatArray, random: RandomState
+) -> None:
+    """Insert the cells in hand one by one, in an order drawn at random or by distance from the first robot."""
+    for r in range(len(s.lengths)):
+        if touched[r]:
+            read(r, s, tables)
+        _tabulate(r, s, tables, loss)
+    keys = np.empty(len(removed))
+    way = draw(random)
+    for k in range(len(removed)):
+        far = float(tables.steps[tables.whole[0, 0], removed[k]])
+        keys[k] = draw(random) if way < 0.6 else far if way < 0.8 else -far
+    for k in np.argsort(keys, kind="mergesort"):
+        cell = removed[k]
+        s.owner[cell] = -1
+        r = _insert(cell, s, tables, loss, random)
+        if r >= 0:
+            touched[r] = True
+            read(r, s, tables)
+            _tabulate(r, s, tables, loss)
 
-    The sequences it changes are marked in ``touched`` and kept in ``old_order``.
-    """
-    n_cells = len(owner)
-    b = int(draw(state) * n_cells)
-    reach = min(near.shape[1], 12)
-    a = near[b, int(draw(state) * reach)]
-    if a < 0:
+
+@kernel(nogil=True)
+def _segment_move(
+    bar: float, s: State, old: State, tables: Tables, touched: NDArray[np.bool_], random: RandomState
+) -> bool:
+    """Make a random cell follow one near it by one of the moves, unless it looks worse than ``bar``."""
+    b = int(draw(random) * len(s.owner))
+    a = tables.near[b, int(draw(random) * min(tables.near.shape[1], _REACH))]
+    if a < 0 or s.owner[a] < 0:
         return False
-    rb, ra = owner[b], owner[a]
-    if ra < 0 or rb < 0:
-        return False
-    ia, ib = 0, 0
-    while order[ra, ia] != a:
-        ia += 1
-    while order[rb, ib] != b:
-        ib += 1
-    for r in (ra, rb):
-        touched[r] = True
-        for k in range(lengths[r]):
-            old_order[r, k] = order[r, k]
-    kind = draw(state)
-    if ra != rb and kind < 0.4:  # swap tails: a is followed by b and what comes after it
-        tail_a, tail_b = lengths[ra] - ia - 1, lengths[rb] - ib
-        for k in range(tail_a):
-            spare[k] = order[ra, ia + 1 + k]
-        for k in range(tail_b):
-            order[ra, ia + 1 + k] = order[rb, ib + k]
-        for k in range(tail_a):
-            order[rb, ib + k] = spare[k]
-        lengths[ra], lengths[rb] = ia + 1 + tail_b, ib + tail_a
-        return True
-    if ra == rb and kind < 0.4:  # reverse what lies between
-        low, high = (ia + 1, ib) if ia < ib else (ib, ia - 1)
-        if low >= high:
-            return False
-        while low < high:
-            order[ra, low], order[ra, high] = order[ra, high], order[ra, low]
-            low += 1
-            high -= 1
-        return True
-    # Move a string that begins (or, reversed, ends) with b behind a.
-    size = 1 + int(draw(state) * draw(state) * 30.0)
-    flip = draw(state) < 0.3
-    if flip:
-        first = max(0, ib - size + 1)
-        size = ib - first + 1
-    else:
-        first = ib
-        size = min(size, lengths[rb] - ib)
-    if ra == rb and first <= ia < first + size:
-        return False
-    for k in range(size):
-        spare[k] = order[rb, first + size - 1 - k] if flip else order[rb, first + k]
-    for k in range(first, lengths[rb] - size):
-        order[rb, k] = order[rb, k + size]
-    lengths[rb] -= size
-    if ra == rb and ia > first:
-        ia -= size
-    for k in range(lengths[ra] - 1, ia, -1):
-        order[ra, k + size] = order[ra, k]
-    for k in range(size):
-        order[ra, ia + 1 + k] = spare[k]
-    lengths[ra] += size
-    return True
+    ra, rb = s.owner[a], s.owner[b]
+    touched[ra] = True
+    if rb < 0:
+        return join(a, b, bar, s, old, tables)
+    touched[rb] = True
+    kind = draw(random)
+    if kind < 0.02:
+        touched[ra] = ra == rb
+        return skip(b, bar, s, old, tables)
+    if kind < 0.45:
+        if ra != rb:
+            return swap_tails(a, b, bar, s, old, tables)
+        return reverse(a, b, bar, s, old, tables)
+    size = 1 + int(draw(random) * draw(random) * 30.0)
+    return shift(a, b, size, draw(random) < 0.4, bar, s, old, tables)
 
 
 @kernel(nogil=True)
@@ -321,21 +204,13 @@ def anneal(
     best_order: Order,
     best_lengths: IntArray,
     best: float,
-    hot: float,
-    cold: float,
+    heat: float,
     iterations: int,
-    state: NDArray[np.uint64],
-    horizon: int,
-    reward: FloatArray,
-    sigma: float,
-    steps: Steps,
-    back_steps: Steps,
-    energy_j: FloatArray,
-    near: Order,
-    whole: IntArray,
-    joules: FloatArray,
+    ruin_share: float,
+    random: RandomState,
+    tables: Tables,
 ) -> float:
-    """Anneal for some iterations from ``hot`` to ``cold``; the value of the best sequences seen is returned.
+    """Anneal for some iterations at one temperature; the value of the best sequences seen is returned.
 
     Parameters
     ----------
@@ -343,104 +218,64 @@ def anneal(
         Current sequences, changed in place.
     best_order, best_lengths, best
         Best sequences so far and their value, changed in place when beaten.
-    hot, cold
-        Temperatures, in units of the objective.
+    heat
+        Temperature in units of the objective.
     iterations
         Moves to try.
-    state
+    ruin_share
+        Share of them that ruin and recreate.
+    random
         Random state (`draw`).
-    horizon, reward, sigma
-        See `RouteProblem`.
-    steps, energy_j, near, whole, joules
-        See `SequenceModel`; ``back_steps`` is ``steps`` transposed.
+    tables
+        The problem.
     """
     robots, n_cells = order.shape
-    arrival = np.zeros((robots, n_cells), dtype=np.int32)
-    owner = np.full(n_cells, -1, dtype=np.int32)
-    old_order, old_lengths = order.copy(), lengths.copy()
-    old_arrival = arrival.copy()
-    values, old_values = np.zeros(robots), np.zeros(robots)
+    s, old = _state(robots, n_cells), _state(robots, n_cells)
     touched = np.zeros(robots, dtype=np.bool_)
-    spare = np.empty(n_cells, dtype=np.int32)
     removed = np.empty(n_cells, dtype=np.int32)
-    keys = np.empty(n_cells)
     loss = np.empty((robots, n_cells + 1, _DELAYS))
+    s.order[:] = order
+    s.lengths[:] = lengths
     for r in range(robots):
-        values[r] = read(r, order, lengths, arrival, owner, horizon, reward, sigma, steps, energy_j, whole, joules)
-    current = values.sum()
+        read(r, s, tables)
+    current = s.values.sum()
     if current > best:
         best = current
-        best_order[:] = order
-        best_lengths[:] = lengths
-    for iteration in range(iterations):
-        heat = hot * (cold / hot) ** (iteration / iterations)
-        old_values[:] = values
+        best_order[:] = s.order
+        best_lengths[:] = s.lengths
+    for _ in range(iterations):
         touched[:] = False
-        old_lengths[:] = lengths
-        if draw(state) >= _RUIN_SHARE:
-            moved = _segment_move(order, lengths, owner, near, touched, spare, state, old_order)
-            if moved:
-                for r in range(robots):
-                    if touched[r]:
-                        old_arrival[r, : old_lengths[r]] = arrival[r, : old_lengths[r]]
-                for r in range(robots):
-                    if touched[r]:
-                        values[r] = read(
-                            r, order, lengths, arrival, owner, horizon, reward, sigma, steps, energy_j, whole, joules
-                        )  # fmt: skip
-            else:
+        bar = heat * np.log(1.0 - draw(random))
+        if draw(random) >= ruin_share:
+            # The estimate overstates what is lost at the horizon, hence the margin.
+            if not _segment_move(1.2 * bar - 1e-9, s, old, tables, touched, random):
                 continue
-        else:
-            for r in range(robots):
-                old_order[r, : lengths[r]] = order[r, : lengths[r]]
-                old_arrival[r, : lengths[r]] = arrival[r, : lengths[r]]
-            count = _ruin(order, lengths, arrival, owner, near, removed, touched, state)
             for r in range(robots):
                 if touched[r]:
-                    values[r] = read(
-                        r, order, lengths, arrival, owner, horizon, reward, sigma, steps, energy_j, whole, joules
-                    )  # fmt: skip
-                _tabulate(r, order, lengths, arrival, horizon, reward, loss)
-            way = draw(state)
-            for k in range(count):
-                cell = removed[k]
-                if way < 0.6:
-                    keys[k] = draw(state)
-                elif way < 0.8:
-                    keys[k] = steps[whole[0, 0], cell]
-                else:
-                    keys[k] = -float(steps[whole[0, 0], cell])
-            for index in np.argsort(keys[:count], kind="mergesort"):
-                cell = removed[index]
-                owner[cell] = -1
-                r = _insert(
-                    cell, order, lengths, arrival, horizon, reward, sigma, steps, back_steps, energy_j, whole,
-                    joules, loss, state,
-                )  # fmt: skip
-                if r >= 0:
-                    touched[r] = True
-                    values[r] = read(
-                        r, order, lengths, arrival, owner, horizon, reward, sigma, steps, energy_j, whole, joules
-                    )  # fmt: skip
-                    _tabulate(r, order, lengths, arrival, horizon, reward, loss)
-        total = values.sum()
-        if total > current + heat * np.log(1.0 - draw(state)):
+                    read(r, s, tables)
+        else:
+            for r in range(robots):
+                keep(r, s, old)
+            count = _ruin(s, tables, removed, touched, random)
+            _recreate(s, tables, removed[:count], touched, loss, random)
+        total = s.values.sum()
+        if total > current + bar:
             current = total
             if current > best + 1e-9 * abs(best):
                 best = current
-                best_order[:] = order
-                best_lengths[:] = lengths
+                best_order[:] = s.order
+                best_lengths[:] = s.lengths
             continue
         for r in range(robots):  # undo
             if touched[r]:
-                for k in range(lengths[r]):
-                    owner[order[r, k]] = -1
+                for k in range(s.lengths[r]):
+                    s.owner[s.order[r, k]] = -1
         for r in range(robots):
             if touched[r]:
-                lengths[r] = old_lengths[r]
-                for k in range(lengths[r]):
-                    order[r, k] = old_order[r, k]
-                    arrival[r, k] = old_arrival[r, k]
-                    owner[order[r, k]] = r
-                values[r] = old_values[r]
+                s.lengths[r] = old.lengths[r]
+                for k in range(s.lengths[r]):
+                    s.order[r, k] = old.order[r, k]
+                read(r, s, tables)
+    order[:] = s.order
+    lengths[:] = s.lengths
     return best

@@ -10,12 +10,14 @@ import numpy as np
 from react_opt.solvers.routes.anneal import anneal
 from react_opt.solvers.routes.beam import best_response
 from react_opt.solvers.routes.greedy import route_classes
+from react_opt.solvers.routes.moves import Tables
 from react_opt.solvers.routes.problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.replay import coupling_faults, feasible, tidy, value
 from react_opt.solvers.routes.sequences import SequenceModel, applies, decode, encode, sequence_model
 
 _DEFAULT_WORK = 100
 _MOST_CELLS = 6000  # above this the square table of fastest ways is not built
+_HOT, _COLD = 0.2, 0.01  # temperatures as shares of what a cell earns at best, on average
 _FIRST_CYCLE = 4  # annealing chunks of the first cycle; every cycle is four times as long as the one before
 _WIDTHS = (64, 256, 1024)
 _EXPANSIONS = 400_000  # labels times arcs that one best response may look at, some tenths of a second
@@ -161,19 +163,21 @@ def _hindered(problem: RouteProblem) -> bool:
 def _anneal(search: _Search, model: SequenceModel, cycle: int) -> None:
     """One cycle of annealing from the best plan, hot first and milder in later cycles."""
     problem = search.problem
-    robots = len(search.classes)
-    moves = max(200, min(2000, 500_000 // (robots * min(problem.horizon, problem.n_cells))))
+    ruin_share = min(0.08, max(0.003, 3.0 / problem.n_cells))  # one costs as much as many segment moves
+    moves = min(10_000, int(150.0 / ruin_share))
     order, lengths = encode(problem, search.routes)
     best_order, best_lengths = order.copy(), lengths.copy()
     reward = np.maximum(problem.reward, 0.0)
-    back_steps = np.ascontiguousarray(model.steps.T)
-    state = np.array([search.rng.integers(1, 1 << 62)], dtype=np.uint64)
+    tables = Tables(
+        problem.horizon, problem.sigma, reward, model.steps, np.ascontiguousarray(model.steps.T), model.energy_j,
+        model.near, model.whole, model.joules,
+    )  # fmt: skip
+    random = np.array([search.rng.integers(1, 1 << 62)], dtype=np.uint64)
     scale = float(np.mean(reward.max(axis=1)[reward.max(axis=1) > 0.0])) if reward.any() else 1.0
-    hot = scale * 0.2
-    cold = scale * 0.004
+    hot, cold = _HOT * scale, _COLD * scale
     chunks = _FIRST_CYCLE << min(2 * cycle, 40)
     begin, left = search.work, search.left()
-    stretched = chunks * search.chunk_share > 0.4 * left  # the last cycle takes all that is left
+    stretched = chunks * search.chunk_share > 0.25 * left  # the last cycle takes all that is left
     worth = -np.inf
     while not search.over():
         share = 1.0 - (search.left() - 0.03) / left if stretched else (search.work - begin) / chunks
@@ -181,10 +185,7 @@ def _anneal(search: _Search, model: SequenceModel, cycle: int) -> None:
             break
         heat = hot * (cold / hot) ** share
         search.work += 1
-        found = anneal(
-            order, lengths, best_order, best_lengths, worth, heat, heat, moves, state, problem.horizon, reward,
-            problem.sigma, model.steps, back_steps, model.energy_j, model.near, model.whole, model.joules,
-        )  # fmt: skip
+        found = anneal(order, lengths, best_order, best_lengths, worth, heat, moves, ruin_share, random, tables)
         if found > worth and not _hindered(problem):
             search.offer(decode(problem, model, best_order, best_lengths))
         worth = found

@@ -17,7 +17,7 @@ def random_problem(rng: np.random.Generator, **given: Any) -> RouteProblem:
     horizon = int(given.get("horizon", rng.integers(2, 6)))
     robots = int(given.get("robots", rng.integers(1, 4)))
     arcs: dict[tuple[int, int, int], float] = {}
-    pairs = [(int(rng.integers(0, j)), j) for j in range(1, n)]
+    pairs: list[tuple[int, ...]] = [(int(rng.integers(0, j)), j) for j in range(1, n)]
     pairs += [tuple(int(v) for v in rng.choice(n, 2, replace=False)) for _ in range(n // 2)]
     for i, j in pairs:
         for _ in range(int(rng.integers(1, 3))):
