@@ -66,6 +66,19 @@ def _skip(stand: Padded, drive: Padded, path: FloatArray) -> FloatArray:
 
 
 @kernel
+def _bend_free(stand: Padded, drive: Padded, ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
+    """Tell whether both legs of a bend are free.
+
+    The first one is part of a free leg, but at touching lengths rounding may tell the part from the whole.
+    """
+    for _ in range(2):  # one call in a loop: the kernel is compiled into its caller
+        if not leg_free(stand, drive, bx, by, cx, cy):
+            return False
+        cx, cy = ax, ay
+    return True
+
+
+@kernel
 def _pull(stand: Padded, drive: Padded, path: FloatArray) -> FloatArray:
     """Slide each corner back towards its predecessor as far as its successor stays in sight."""
     kept = np.empty_like(path)
@@ -78,7 +91,7 @@ def _pull(stand: Padded, drive: Padded, path: FloatArray) -> FloatArray:
         low, high = 0.0, 2.0  # the first try is all the way: the corner goes
         for _ in range(_HALVINGS):
             half = 0.5 * (low + high)
-            if leg_free(stand, drive, bx + half * (ax - bx), by + half * (ay - by), cx, cy):
+            if _bend_free(stand, drive, ax, ay, bx + half * (ax - bx), by + half * (ay - by), cx, cy):
                 low = half
                 if low == 1.0:
                     break
@@ -118,11 +131,11 @@ def tighten(stand: Padded, drive: Padded, path: FloatArray) -> FloatArray:
     """
     path = _skip(stand, drive, path)
     length = _length(path)
-    for _ in range(_PASSES):
+    for _pass in range(_PASSES):
         if len(path) <= 2:
             break
-        path = _pull(stand, drive, path)[::-1].copy()
-        path = _pull(stand, drive, path)[::-1].copy()
+        for _ in range(2):
+            path = _pull(stand, drive, path)[::-1].copy()
         shorter = _length(path)
         settled = length - shorter <= _SETTLED * length
         length = shorter
