@@ -259,14 +259,18 @@ def _message(item: Any, model: type[BaseModel]) -> str:
         "dict_type": "an object",
         "model_type": "an object",
         "model_attributes_type": "an object",
-        "greater_than_equal": f"a number >= {context.get('ge')}",
-        "greater_than": f"a number > {context.get('gt')}",
-        "less_than_equal": f"a number <= {context.get('le')}",
+        "greater_than_equal": f"a number >= {_limit(context.get('ge'))}",
+        "greater_than": f"a number > {_limit(context.get('gt'))}",
+        "less_than_equal": f"a number <= {_limit(context.get('le'))}",
         "literal_error": str(context.get("expected")),
         "too_short": f"at least {context.get('min_length')} entries",
         "too_long": f"at most {context.get('max_length')} entries",
     }.get(kind, str(item["msg"]))
     return f"expected {expected}, found {_shown(item['input'])}"
+
+
+def _limit(value: Any) -> Any:
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _field_names(model: type[BaseModel]) -> set[str]:

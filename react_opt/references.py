@@ -40,8 +40,14 @@ def _rows(data: dict[str, Any], key: str) -> Iterator[tuple[str, dict[str, Any]]
                 yield f"{key}[{index}]", row
 
 
-def _ids(data: dict[str, Any], key: str) -> set[str]:
-    return {row["id"] for _, row in _rows(data, key) if isinstance(row.get("id"), str)}
+def _ids(data: dict[str, Any], key: str) -> set[str] | None:
+    """Return the ids of a list, None where it is malformed: then nothing can be said of names that refer to it."""
+    rows = data.get(key)
+    if not isinstance(rows, list | tuple):
+        return None
+    ids = [row.get("id") if isinstance(row, dict) else None for row in rows]
+    named = {name for name in ids if isinstance(name, str) and name}
+    return named if all(isinstance(name, str) and name for name in ids) else None
 
 
 def _unique(data: dict[str, Any], key: str, fields: tuple[str, ...] = ("id",)) -> Iterator[Place]:
@@ -58,9 +64,9 @@ def _unique(data: dict[str, Any], key: str, fields: tuple[str, ...] = ("id",)) -
             seen[value] = place
 
 
-def _refers(row: dict[str, Any], place: str, field: str, known: set[str], what: str) -> Iterator[Place]:
+def _refers(row: dict[str, Any], place: str, field: str, known: set[str] | None, what: str) -> Iterator[Place]:
     value = row.get(field)
-    if isinstance(value, str) and value and value not in known:
+    if known is not None and isinstance(value, str) and value and value not in known:
         yield f"{place}.{field}", f"expected the id of a {what}, found {value!r}"
 
 
@@ -108,7 +114,7 @@ def _assignment(data: dict[str, Any]) -> Iterator[Place]:
     for place, row in _rows(data, "robots"):
         yield from _batteries(row, place)
         zone = row.get("zone")
-        if isinstance(zone, list | tuple):
+        if targets is not None and isinstance(zone, list | tuple):
             for index, target in enumerate(zone):
                 if isinstance(target, str) and target and target not in targets:
                     yield f"{place}.zone[{index}]", f"expected the id of a target, found {target!r}"
@@ -123,7 +129,7 @@ def _assignment(data: dict[str, Any]) -> Iterator[Place]:
             if not isinstance(pair, list | tuple) or len(pair) != 2:
                 continue
             for side, target in enumerate(pair):
-                if isinstance(target, str) and target and target not in targets:
+                if targets is not None and isinstance(target, str) and target and target not in targets:
                     yield f"conflicts[{index}][{side}]", f"expected the id of a target, found {target!r}"
             if isinstance(pair[0], str) and pair[0] == pair[1]:
                 yield f"conflicts[{index}]", f"expected two different targets, found {pair[0]!r} twice"
@@ -157,7 +163,7 @@ def _fleet(data: dict[str, Any]) -> Iterator[Place]:
     yield from _unique(data, "robots")
     for place, row in _rows(data, "robots"):
         yield from _refers(
-            row, place, "profile", set(profiles) if isinstance(profiles, dict) else set(), "profile"
+            row, place, "profile", set(profiles) if isinstance(profiles, dict) and profiles else None, "profile"
         )
 
 
