@@ -43,7 +43,7 @@ class Lattice:
     def __init__(self, problem: RouteProblem) -> None:
         self.sigma = problem.sigma
         positive = problem.reward[problem.reward > 0]
-        self.reward_unit = _unit(positive)
+        self.reward_unit = _unit(positive) if len(positive) else 1.0
         energies = [problem.arc_energy_j]
         energies += [np.array([group.wait_j, group.sense_j]) for group in problem.classes]
         self.energy_unit = _unit(np.concatenate(energies))
@@ -64,7 +64,7 @@ class Lattice:
         bound
             A valid bound on the objective.
         """
-        bound += SAFETY * max(1.0, abs(bound))
+        bound += SAFETY * abs(bound)
         if self.reward_unit == 0.0 or not math.isfinite(bound):
             return bound
         if self.sigma == 0.0:
@@ -82,7 +82,7 @@ class Lattice:
             if battery >= self.least_j - 1e-7:
                 best = max(best, coverage + self.sigma * battery)
             level -= 1
-        return min(bound, best + SAFETY * max(1.0, abs(best))) if best > -math.inf else bound
+        return min(bound, best + SAFETY * abs(best)) if best > -math.inf else bound
 
 
 def _unit(values: FloatArray) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -26,6 +27,12 @@ from react_opt.solvers.routes.selection import select
 
 FIRST_MEMORY = 8
 MOST_CUTS = 64
+EASY_ROUTES = 3_000
+MOST_ROUTES = 30_000
+PRIMAL_SHARE = 0.3
+FIRST_SEARCH_S = 0.004  # per cell
+FIRST_SEARCH_WORK = 20
+CHOICE = 500
 Status = Literal["optimal", "feasible", "infeasible", "no_plan", "not_priced"]
 
 
@@ -145,10 +152,16 @@ class _Proof:
             problem.robots_per_cell is not None or problem.sensing_robots_per_step is not None or problem.forbid_swaps
         )
         self.proof: dict[str, Any] = {}
+        self._searches = 0
 
     def run(self) -> None:
         """Go on until the plan is proven or a limit is reached."""
         if self.standing.routes is not None:
+            budget = self.standing.budget
+            wait_s = FIRST_SEARCH_S * self.problem.n_cells
+            if budget.deadline is not None:
+                wait_s = min(wait_s, 0.05 * max(0.0, budget.deadline - budget.begun))
+            self._improve_until(time.perf_counter() + wait_s, FIRST_SEARCH_WORK)
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
         while not self.standing.done():
             solved = self.generation.converge(at_root=True)
@@ -160,9 +173,10 @@ class _Proof:
             if self._add_limits() or self._grow_memory():
                 continue
             self._improve()
-            if self.standing.done() or self._finish_by_enumeration():
+            if self.standing.done() or self._finish_by_enumeration(EASY_ROUTES):
                 break
             if not self._cut():
+                self._finish_by_enumeration(MOST_ROUTES)
                 break
         if not self.standing.done() and self.standing.budget.limit == "none":
             self._search_on()
@@ -215,6 +229,17 @@ class _Proof:
 
     def _improve(self) -> None:
         """Look for better plans: whole columns of the master, then a short primal search."""
+        point = self.generation.point
+        if point is not None and np.all((point.use < 1e-6) | (np.abs(point.use - np.round(point.use)) < 1e-6)):
+            whole = [
+                column.path
+                for k in np.flatnonzero(point.use > 0.5)
+                for column in [self.master.columns[k]] * round(float(point.use[k]))
+            ]
+            if len(whole) == self.problem.n_robots:
+                self.standing.offer(sorted(whole, key=lambda route: route.robot_class))
+                if self.standing.done():
+                    return
         standing = self.standing
         left = standing.budget.left_s()
         chosen = select(
@@ -223,7 +248,7 @@ class _Proof:
             self.counts,
             gap=0.1 * (standing.slack or 0.0),
             floor=None,
-            time_limit_s=5.0 if left is None else min(5.0, 0.2 * left),
+            time_limit_s=1.0 if left is None else min(1.0, 0.2 * left),
             node_limit=200,
             seed=self.seed,
         )
@@ -232,6 +257,7 @@ class _Proof:
             standing.offer([column.path for column in chosen.columns])
         if standing.routes is None or standing.done():
             return
+        self._search(PRIMAL_SHARE)
 
     def _simple_columns(self) -> list[Column]:
         """Return the master's best columns, second collections of a cell left out."""
@@ -239,13 +265,13 @@ class _Proof:
         columns = self.master.columns
         if point is not None:
             reduced = self.master.reduced_values(point.duals)
-            columns = [columns[k] for k in np.argsort(-reduced, kind="stable")[:3000]]
+            columns = [columns[k] for k in np.argsort(-reduced, kind="stable")[:CHOICE]]
         return [
             column if column.elementary else route_column(self.problem, tidy(self.problem, [column.path])[0])
             for column in columns
         ]
 
-    def _finish_by_enumeration(self) -> bool:
+    def _finish_by_enumeration(self, most: int) -> bool:
         """Enumerate all routes that a better plan can contain and choose among them; return whether it was done."""
         standing, best = self.standing, self.generation.best
         if best is None or self.coupled or standing.objective is None:
@@ -262,6 +288,7 @@ class _Proof:
                 float(best.duals.group[group]) - gap,
                 self.generation.side,
                 self.master.cuts,
+                max_routes=most,
             )
             standing.budget.spend()
             if found is None:
@@ -302,24 +329,51 @@ class _Proof:
         self.master.add_cuts(cuts)
         return bool(cuts)
 
+    def _search(self, share: float) -> None:
+        """Spend a share of the time so far on the primal search (of the work so far under a work limit)."""
+        standing, budget = self.standing, self.standing.budget
+        if standing.routes is None:
+            return
+        spent = time.perf_counter() - budget.begun
+        deadline = time.perf_counter() + share * spent
+        if budget.deadline is not None:
+            deadline = min(deadline, budget.deadline)
+        self._improve_until(deadline, round(share * budget.work))
+
     def _search_on(self) -> None:
         """Spend what is left on the primal search."""
-        standing = self.standing
-        if standing.routes is None or (standing.budget.deadline is None and standing.budget.work_limit is None):
+        budget = self.standing.budget
+        if budget.deadline is None and budget.work_limit is None:
             return
-        left = None
-        if standing.budget.work_limit is not None:
-            left = standing.budget.work_limit - standing.budget.work
-            standing.budget.spend(left)
-        improve(
+        self._improve_until(budget.deadline, 0 if budget.work_limit is None else budget.work_limit - budget.work)
+
+    def _improve_until(self, deadline: float | None, work: int) -> None:
+        """Run the primal search up to a time, or for some work where work is limited."""
+        standing, budget = self.standing, self.standing.budget
+        if standing.routes is None:
+            return
+        counted = budget.work_limit is not None
+        if counted:
+            assert budget.work_limit is not None
+            work = max(1, min(work, budget.work_limit - budget.work))
+            budget.spend(work)
+            deadline = budget.deadline
+        self._searches += 1
+        better = improve(
             self.problem,
             standing.routes,
-            deadline=standing.budget.deadline,
-            work_limit=left,
-            seed=self.seed,
-            should_stop=standing.done,
-            on_improve=lambda routes, _: standing.offer(routes) and None,
+            deadline=deadline,
+            work_limit=work if counted else None,
+            seed=self.seed + self._searches,
+            should_stop=(lambda: False) if counted and deadline is None else standing.done,
+            on_improve=lambda routes, _: self._take(routes),
         )
+        self._take(better)
+
+    def _take(self, routes: Sequence[Route]) -> None:
+        """Offer a plan, and its routes to the master."""
+        if self.standing.offer(routes):
+            self.master.add([route_column(self.problem, route) for route in routes])
 
 
 def _cycles(route: Route) -> list[tuple[int, int]]:
