@@ -105,7 +105,7 @@ def run(program: Program, request: Request, watch: Watch) -> Claim:
         solver.best_bound_callback = lambda bound: watch.proved(bound / scale)
     watch.on_stop = solver.stop_search
     status = solver.solve(handed.model, Improved())
-    return _claim(handed, program, request, solver, status, settings, cp_model)
+    return _claim(handed, request, watch, solver, status, settings, cp_model)
 
 
 def _settings(request: Request, scale: float) -> dict[str, Any]:
@@ -123,8 +123,8 @@ def _settings(request: Request, scale: float) -> dict[str, Any]:
 
 def _claim(
     handed: CpSatModel,
-    program: Program,
     request: Request,
+    watch: Watch,
     solver: Any,
     status: Any,
     settings: dict[str, Any],
@@ -148,4 +148,6 @@ def _claim(
         request.work_limit is not None and solver.response_proto.deterministic_time >= request.work_limit / _WORK_UNITS
     ):
         claim.limit = "work"
+    elif request.time_limit_s is not None and watch.reason is None:
+        claim.limit = "time"
     return claim

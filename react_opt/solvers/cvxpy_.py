@@ -168,15 +168,12 @@ def to_cvxpy(program: Program) -> tuple[Any, dict[str, Any]]:
 def _rows(program: Program, activity: Any, cp: Any) -> list[Any]:
     row_lower, row_upper = program.row_lower, program.row_upper
     activity = cp.Constant(activity) if isinstance(activity, np.ndarray) else activity
-    equal = row_lower == row_upper
-    rows = []
-    for chosen_rows, build in (
-        (np.flatnonzero(equal), lambda part, at: part == row_lower[at]),
-        (np.flatnonzero(~equal & np.isfinite(row_lower)), lambda part, at: part >= row_lower[at]),
-        (np.flatnonzero(~equal & np.isfinite(row_upper)), lambda part, at: part <= row_upper[at]),
-    ):
-        if len(chosen_rows):
-            rows.append(build(activity[chosen_rows], chosen_rows))
+    equal = np.flatnonzero(row_lower == row_upper)
+    low = np.flatnonzero((row_lower != row_upper) & np.isfinite(row_lower))
+    high = np.flatnonzero((row_lower != row_upper) & np.isfinite(row_upper))
+    rows = [activity[equal] == row_lower[equal]] if len(equal) else []
+    rows += [activity[low] >= row_lower[low]] if len(low) else []
+    rows += [activity[high] <= row_upper[high]] if len(high) else []
     return rows
 
 
@@ -209,7 +206,7 @@ def run(program: Program, request: Request, watch: Watch, variant: str = "") -> 
         claim.status, claim.bound = "infeasible", None
     elif status == cp.UNBOUNDED:
         claim.status, claim.bound = "unbounded", None
-    elif status == cp.USER_LIMIT:
+    elif status in (cp.USER_LIMIT, cp.OPTIMAL_INACCURATE) and request.time_limit_s is not None:
         claim.limit = "time"
     elif status is not None:
         notes.append(f"cvxpy: {solver} stopped with the status {status!r}")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 
@@ -167,7 +168,7 @@ class _Exact:
         self.cost = [value or Fraction(0) for value in exact(program.cost)]
         terms = list(zip(matrix.indices.tolist(), (a or Fraction(0) for a in exact(matrix.data)), strict=True))
         ends = matrix.indptr.tolist()
-        self.rows = [terms[first:last] for first, last in zip(ends[:-1], ends[1:], strict=True)]
+        self.rows = [terms[first:last] for first, last in pairwise(ends)]
 
     def refusal(self, why: str) -> UsageError:
         return UsageError(

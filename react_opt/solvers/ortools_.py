@@ -102,7 +102,7 @@ def run(program: Program, request: Request, watch: Watch) -> Claim:
         if data.solution is not None and data.event == mathopt.Event.MIP_SOLUTION:
             x = np.array([data.solution[variable] for variable in variables])
             watch.found(x, program.objective(x))
-        if data.mip_stats is not None and data.mip_stats.dual_bound is not None:
+        if data.event == mathopt.Event.MIP_NODE:  # before the first node the statistics hold zeros
             watch.proved(data.mip_stats.dual_bound)
         return mathopt.CallbackResult(terminate=watch.stopped())
 

@@ -56,8 +56,7 @@ def conclude(
     if claim.status == "unbounded":
         notes.append("the objective is unbounded")
         claim.bound, recorded = None, (recorded[0], None)
-    bounds = [bound for bound in (claim.bound, recorded[1]) if bound is not None and np.isfinite(bound)]
-    bound = sign * min(sign * value for value in bounds) if bounds else None
+    bound = recorded[1] if claim.bound is None else claim.bound
     status: Status
     objective: float | None = None
     if x is None:
