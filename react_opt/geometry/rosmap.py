@@ -37,6 +37,7 @@ from react_opt.geometry.occupancy import FREE, MAX_PIXELS, OCCUPIED, UNKNOWN, Oc
 
 Mode = Literal["trinary", "scale", "raw"]
 _MODES = ("trinary", "scale", "raw")
+_FORMATS = ("PPM", "PNG", "BMP", "GIF", "JPEG", "TIFF")  # map_server's; not all Pillow has: EPS runs a programme
 _MAX_YAML_BYTES = 1_000_000
 
 
@@ -245,8 +246,8 @@ def _read_image(path: Path) -> tuple[NDArray[np.integer[Any]], int, NDArray[np.b
     """Return ``(rows, cols)`` shades from the top down, the shade of white, and which pixels are opaque."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # bounded by MAX_PIXELS below
-            with Image.open(path) as image:
+            warnings.simplefilter("ignore")  # Pillow's notes on odd metadata; the size is bounded below
+            with Image.open(path, formats=_FORMATS) as image:
                 if image.width * image.height > MAX_PIXELS:
                     size = f"{image.width} x {image.height}"
                     message = f"expected at most {MAX_PIXELS} pixels, found {size}"
@@ -254,7 +255,7 @@ def _read_image(path: Path) -> tuple[NDArray[np.integer[Any]], int, NDArray[np.b
                 image.load()
                 return _shades(image, path)
     except UnidentifiedImageError as error:
-        raise InputError.single(str(path), "", "expected an image (PGM, PNG), found something else") from error
+        raise InputError.single(str(path), "", "expected an image (PGM, PNG, ...), found something else") from error
     except Image.DecompressionBombError as error:
         message = f"expected at most {MAX_PIXELS} pixels, found many more"
         raise InputError.single(str(path), "", message) from error

@@ -120,11 +120,18 @@ def check_costs(costs: PathCosts, space: FreeSpace, points: np.ndarray, metric: 
 
 
 @settings(derandomize=True, deadline=None, max_examples=15)
-@given(seed=seeds, radius=st.sampled_from((0.0, 0.8, 1.5)), refine=st.integers(1, 2), yaw=st.sampled_from((0.0, 0.7)))
-def test_promises_of_every_table_and_path(seed: int, radius: float, refine: int, yaw: float) -> None:
+@given(
+    seed=seeds,
+    radius=st.sampled_from((0.0, 0.8, 1.5)),
+    refine=st.integers(1, 2),
+    pose=st.sampled_from(((0.0, 0.0, 0.0), (-3.0, 40.0, 0.7), (5e5, 4e6, -2.0))),  # the last as in UTM
+)
+def test_promises_of_every_table_and_path(
+    seed: int, radius: float, refine: int, pose: tuple[float, float, float]
+) -> None:
     rng = np.random.default_rng(seed)
     cells = (rng.random((25, 30)) < 0.06).astype(np.uint8)
-    map_ = OccupancyMap(cells, 0.5, -3.0, 40.0, yaw)
+    map_ = OccupancyMap(cells, 0.5, *pose)
     space = inflate(map_, Footprint(radius * 0.5), refine=refine)
     points = map_.pixel_to_world(rng.random((8, 2)) * (30, 25))
     check_costs(VisibilityCosts(space, ROBOT), space, points, metric=True)
