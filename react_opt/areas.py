@@ -65,8 +65,8 @@ class AreaGrid:
         """Return where a robot stands in an area, None where it cannot.
 
         Of the largest connected part of the area that robots reach, the pixels with the best clearance count, up
-        to ``easy_m``: more makes driving no easier. Of these the one nearest to the area's centre is taken. With
-        ``near_m``, simply the reachable pixel nearest to that point.
+        to ``easy_m``: more makes driving no easier. Of these the one nearest to the area's centre is taken, the
+        centre itself where it is one of them. With ``near_m``, simply the reachable point nearest to that point.
 
         Parameters
         ----------
@@ -90,6 +90,11 @@ class AreaGrid:
             x, y = self.col_edges[[a, a + 1]].mean(), self.row_edges[[b, b + 1]].mean()
         else:
             x, y = self.space.to_pixels(near_m)
+        row, col = floor(y) - low_row, floor(x) - low_col
+        if 0 <= row < inside.shape[0] and 0 <= col < inside.shape[1] and inside[row, col]:
+            wanted = self.space.to_world((x, y))
+            if self.space.points_free(wanted)[0]:
+                return wanted
         rows, cols = np.nonzero(inside)
         best = int(np.argmin((cols + low_col + 0.5 - x) ** 2 + (rows + low_row + 0.5 - y) ** 2))
         return self.space.to_world((cols[best] + low_col + 0.5, rows[best] + low_row + 0.5))
@@ -137,7 +142,7 @@ def lay_grid(space: FreeSpace, region: int, cell_m: float) -> AreaGrid:
     edges = []
     for axis, zero in ((0, origin[0]), (1, origin[1])):
         taken = np.flatnonzero(reachable.any(axis=axis))
-        low, high = taken[0] - reach, taken[-1] + 1 + reach
+        low, high = max(0.0, taken[0] - reach), min(reachable.shape[1 - axis], taken[-1] + 1 + reach)
         slack = 1e-6 * side
         count = max(1, ceil((high - low - slack) / side))
         start = zero + floor((low - zero + slack) / side) * side
