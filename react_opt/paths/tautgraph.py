@@ -48,11 +48,14 @@ def taut_graph(space: FreeSpace, field: Field) -> Graph:
     """Return the taut visibility graph of a map."""
     corners = corners_of(space)
     _shadows(space.padded, corners)
-    one, two = _taut_segments(space.padded, corners)
+    count = corners.shape[0]
+    partners = [_partners(space.padded, corners, i) for i in range(count)]
+    one = np.repeat(np.arange(count), [seen.size for seen in partners])
+    two = np.concatenate([np.empty(0, dtype=np.int64), *partners])
     start, end = np.concatenate((one, two)), np.concatenate((two, one))
     order = np.lexsort((end, start))
     start, end = start[order], end[order]
-    first = np.searchsorted(start, np.arange(corners.shape[0] + 1)).astype(np.int64)
+    first = np.searchsorted(start, np.arange(count + 1)).astype(np.int64)
     length, time = _measure(field, corners, start, end)
     return corners, first, end, length, time
 
@@ -101,26 +104,21 @@ def _shadows(padded: Padded, corners: FloatArray) -> None:
 
 
 @kernel
-def _taut_segments(padded: Padded, corners: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return the pairs of corners that see each other along segments taut at both ends."""
-    size, found = 1024, 0
-    one, two = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-    for i in range(corners.shape[0]):
-        x, y = corners[i, 0], corners[i, 1]
-        for j in range(i + 1, corners.shape[0]):
-            dx, dy = corners[j, 0] - x, corners[j, 1] - y
-            if not (_lean(corners, i, dx, dy) and _lean(corners, j, -dx, -dy)):
-                continue
-            if not clear_between_px(padded, x, y, corners[j, 0], corners[j, 1]):
-                continue
-            if found == size:
-                size *= 2
-                more_one, more_two = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-                more_one[:found], more_two[:found] = one, two
-                one, two = more_one, more_two
-            one[found], two[found] = i, j
+def _partners(padded: Padded, corners: FloatArray, i: int) -> IntArray:
+    """Return the later corners that a corner sees along segments taut at both ends."""
+    count = corners.shape[0]
+    seen, found = np.empty(count - i, dtype=np.int64), 0
+    x, y = corners[i, 0], corners[i, 1]
+    for j in range(i + 1, count):
+        dx, dy = corners[j, 0] - x, corners[j, 1] - y
+        if (
+            _lean(corners, i, dx, dy)
+            and _lean(corners, j, -dx, -dy)
+            and clear_between_px(padded, x, y, corners[j, 0], corners[j, 1])
+        ):
+            seen[found] = j
             found += 1
-    return one[:found].copy(), two[:found].copy()
+    return seen[:found]
 
 
 @kernel
@@ -151,4 +149,4 @@ def seen_from(padded: Padded, corners: FloatArray, x: float, y: float) -> IntArr
         ):
             seen[found] = k
             found += 1
-    return seen[:found].copy()
+    return seen[:found]
