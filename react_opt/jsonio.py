@@ -9,6 +9,7 @@ import json
 import os
 import sys
 import tempfile
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -192,6 +193,8 @@ def _read_text(name: str) -> str:
         raise InputError.single(name, f"byte {error.start}", "expected UTF-8 text") from None
     except OSError as error:
         raise InputError.single(name, "", f"cannot be read: {error.strerror or error}") from None
+    except ValueError as error:  # a null byte in the name
+        raise InputError.single(name, "", f"cannot be read: {error}") from None
 
 
 def _decode(text: str, file: str) -> Any:
@@ -242,9 +245,8 @@ def _message(item: Any, model: type[BaseModel]) -> str:
     if kind == "missing":
         return "required, but missing"
     if kind == "extra_forbidden":
-        known = _field_names(model)
-        close = difflib.get_close_matches(str(item["loc"][-1]), known, n=1)
-        return "unknown field" + (f", did you mean {close[0]!r}?" if close else "")
+        close = _closest_field(model, str(item["loc"][-1]))
+        return "unknown field" + (f", did you mean {close!r}?" if close else "")
     if kind == "value_error":
         return str(context["error"])
     expected = {
@@ -273,10 +275,10 @@ def _limit(value: Any) -> Any:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _field_names(model: type[BaseModel]) -> set[str]:
-    names: set[str] = set()
-    for definition in [model.model_json_schema(by_alias=True)]:
-        names.update(definition.get("properties", {}))
-        for part in definition.get("$defs", {}).values():
-            names.update(part.get("properties", {}))
-    return names
+@lru_cache(maxsize=1024)
+def _closest_field(model: type[BaseModel], name: str) -> str | None:
+    schema = model.model_json_schema(by_alias=True)
+    known = {*schema.get("properties", {})}
+    for part in schema.get("$defs", {}).values():
+        known.update(part.get("properties", {}))
+    return next(iter(difflib.get_close_matches(name, sorted(known), n=1)), None)
