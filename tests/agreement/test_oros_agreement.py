@@ -50,7 +50,7 @@ def test_the_product_agrees_with_brute_force(way: str, seed: int, monkeypatch: p
     instance = random_oros(seed)
     options = {"auto": {}, "routes": {"method": "routes"}}.get(way, {"solver": way})
     try:
-        plan = solve(instance, time_limit_s=60.0, threads=1, **options)
+        plan = solve(instance, time_limit_s=20.0, threads=1, **options)
     except UsageError as refused:
         if way not in REFUSALS:
             raise
