@@ -1,0 +1,212 @@
+"""Deferred-priority inspection: from an instance to a checked plan."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from react_opt.certify_inspection import OPTIMAL_GAP, check_inspection
+from react_opt.claims import instance_ref, versions
+from react_opt.errors import InputError, ReactError
+from react_opt.instance import InspectionInstance
+from react_opt.models.inspection import InspectionArrays, InspectionModel, Routes, build
+from react_opt.options import SolveOptions
+from react_opt.plan import (
+    InspectionClaim,
+    InspectionPlan,
+    InspectionRoute,
+    Plan,
+    Secondary,
+    Skipped,
+    Stop,
+    gap_of,
+)
+from react_opt.solvers.inspection.baseline import Gate, gate, simple_rule
+from react_opt.solvers.inspection.control import Control
+from react_opt.solvers.inspection.decompose import Answer, Decomposition
+from react_opt.solvers.inspection.explain import Reason, reasons, with_losses
+from react_opt.solvers.inspection.whole import solve_whole
+
+__all__ = ["Gate", "gate", "inspect", "simple_rule", "solve_inspection"]
+
+CHECK_S = 0.01  # kept for reading the plan back and checking it
+
+
+def inspect(arrays: InspectionArrays, options: SolveOptions, routes: Routes | None = None) -> tuple[Answer, Control]:
+    """Solve an inspection on arrays by route decomposition: the entry for a control loop.
+
+    Parameters
+    ----------
+    arrays
+        The problem (:func:`react_opt.models.inspection.build`).
+    options
+        Limits, threads, seed and gap. The unit of ``work_limit`` is one pricing or one portion of local search.
+    routes
+        Feasible routes to start from; None for none.
+
+    Returns
+    -------
+    Answer
+        Routes, value and second objective with their bounds.
+    Control
+        What stopped it, and the work done.
+    """
+    deadline = None if options.deadline is None else options.deadline - CHECK_S
+
+    def report(value: float | None, bound: float) -> None:
+        if options.on_progress is not None:
+            options.on_progress(time.perf_counter() - options.begun, value, bound)
+
+    with Control(deadline, options.work_limit, options.should_stop) as control:
+        search = Decomposition(
+            arrays, control, threads=options.threads, seed=options.seed, gap=options.gap or 0.0, routes=routes,
+            on_bound=report,
+        )  # fmt: skip
+        return search.run(), control
+
+
+def solve_inspection(instance: InspectionInstance, options: SolveOptions, start: Plan | None = None) -> InspectionPlan:
+    """Solve an ``inspection`` instance; see :func:`react_opt.solve`.
+
+    Raises
+    ------
+    InputError
+        Where ``start`` is no valid plan of the instance.
+    """
+    model = build(instance)
+    known = None if start is None else _started(instance, model, start)
+    wall_s = {"build": time.perf_counter() - options.begun}
+    begun = time.perf_counter()
+    settings: dict[str, Any] = {
+        "time_limit_s": options.time_limit_s, "work_limit": options.work_limit, "gap": options.gap,
+    }  # fmt: skip
+    if options.method == "monolith" or (options.solver is not None and options.method == "auto"):
+        answer, limit, solver, version, more = solve_whole(model.arrays, options, known)
+        method = "monolith: asked for" if options.method == "monolith" else f"monolith: solver {solver} was asked for"
+        found_with = {**versions("numpy", "scipy"), solver: version}
+        settings.update(more)
+    else:
+        answer, control = inspect(model.arrays, options, known)
+        limit = control.limit
+        if answer.stuck and limit == "none":
+            limit = "memory"
+        method, solver = "routes", "react_opt with highs"
+        found_with = versions("numpy", "scipy", "numba", "highspy")
+        settings.update(answer.notes)
+    wall_s["solve"] = time.perf_counter() - begun
+    facts: dict[str, Any] = {
+        "method": method, "solver": solver, "versions": found_with, "seed": options.seed, "threads": options.threads,
+        "settings": settings,
+    }  # fmt: skip
+    if answer.routes is None:
+        return _without_plan(instance, model, answer, limit, {**facts, "wall_s": wall_s})
+    begun = time.perf_counter()
+    optimal = answer.value_bound - answer.value <= OPTIMAL_GAP * abs(answer.value)
+    if options.explain and optimal:
+        deadline = None if options.deadline is None else options.deadline - CHECK_S
+        with Control(deadline, None, options.should_stop) as left:
+            why = with_losses(model.arrays, answer.routes, answer.value, left, options.seed)
+    else:
+        why = reasons(model.arrays, answer.routes)
+    wall_s["explain"] = time.perf_counter() - begun
+    best = (
+        optimal
+        and answer.cost_bound is not None
+        and answer.cost - answer.cost_bound <= OPTIMAL_GAP * max(1.0, answer.cost)
+    )
+    claim = InspectionClaim(
+        status="optimal" if optimal else "feasible",
+        objective=answer.value,
+        bound=max(answer.value_bound, answer.value),
+        gap=gap_of(answer.value, max(answer.value_bound, answer.value)),
+        limit="none" if optimal and best else limit,
+        wall_s=wall_s,
+        secondary=Secondary(
+            objective=answer.cost,
+            bound=None if answer.cost_bound is None or not optimal else min(answer.cost_bound, answer.cost),
+            status="optimal" if best else "feasible",
+        ),
+        **facts,
+    )
+    plan = _filled(instance, model, answer.routes, claim, why)
+    begun = time.perf_counter()
+    found = check_inspection(instance, plan)
+    if not found.ok:
+        raise ReactError(f"no plan passed the checker; please report this: {found.violations[0]}")
+    wall_s = {**wall_s, "check": time.perf_counter() - begun}
+    return plan.model_copy(update={"claim": claim.model_copy(update={"wall_s": wall_s})})
+
+
+def _started(instance: InspectionInstance, model: InspectionModel, start: Plan) -> Routes:
+    """Return the routes of a plan that the checker accepts."""
+    if not isinstance(start, InspectionPlan):
+        raise InputError.single("<start>", "kind", f"expected an inspection_plan, found {start.kind!r}")
+    found = check_inspection(instance, start)
+    if not found.ok:
+        raise InputError.single("<start>", "", f"expected a valid plan of this instance: {found.violations[0]}")
+    number = {name: index for index, name in enumerate(model.targets)}
+    stops = {route.robot: [number[stop.target] for stop in route.stops] for route in start.routes}
+    return [stops.get(name, []) for name in model.robots]
+
+
+def _filled(
+    instance: InspectionInstance,
+    model: InspectionModel,
+    routes: Routes,
+    claim: InspectionClaim,
+    why: list[Reason],
+) -> InspectionPlan:
+    """Return the plan of routes, with its times and batteries."""
+    arrays, n, rows = model.arrays, len(model.targets), []
+    for r, robot in enumerate(instance.robots):
+        at, now_s, spent_j, stops = n, 0.0, 0.0, []
+        for k in routes[r]:
+            now_s += float(arrays.time_s[r, at, k])
+            spent_j += float(arrays.energy_j[r, at, k])
+            stops.append(
+                Stop(
+                    target=model.targets[k],
+                    arrive_s=now_s - instance.targets[k].service_s,
+                    leave_s=now_s,
+                    battery_j=robot.battery_j - spent_j,
+                )
+            )
+            at = k
+        now_s += float(arrays.time_s[r, at, n + 1])
+        spent_j += float(arrays.energy_j[r, at, n + 1])
+        rows.append(
+            InspectionRoute(
+                robot=robot.id,
+                stops=tuple(stops),
+                end=robot.end,
+                finish_s=now_s,
+                finish_battery_j=robot.battery_j - spent_j,
+            )
+        )
+    return InspectionPlan(
+        instance=instance_ref(instance),
+        claim=claim,
+        routes=tuple(rows),
+        t_dpi_s=max((row.finish_s for row in rows), default=0.0),
+        skipped=tuple(Skipped(target=model.targets[row.target], reason=row.reason, loss=row.loss) for row in why),
+    )
+
+
+def _without_plan(
+    instance: InspectionInstance, model: InspectionModel, answer: Answer, limit: str, facts: dict[str, Any]
+) -> InspectionPlan:
+    reason = None
+    if answer.infeasible:
+        reason = "fleet: end: no plan brings every robot to its end"
+        for r, robot in enumerate(instance.robots):
+            if not model.arrays.allows(r, []):
+                reason = f"robot {robot.id}: end: {robot.end!r} cannot be reached within the time left and the energy"
+                break
+    claim = InspectionClaim(
+        status="infeasible" if answer.infeasible else "no_plan",
+        bound=None if answer.infeasible else answer.value_bound,
+        limit="none" if answer.infeasible else limit,  # type: ignore[arg-type]
+        reason=reason,
+        **facts,
+    )
+    return InspectionPlan(instance=instance_ref(instance), claim=claim)

@@ -1,0 +1,374 @@
+"""The inspection by route decomposition: column generation, then every route that could matter, then a choice.
+
+Stage 1 maximises the value, stage 2 minimises the second objective among plans of that value. Each stage
+prices routes until the linear program is optimal, which bounds every plan (the bound of Lagrange holds at any
+prices); where the best plan known does not meet the bound, all routes whose reduced profit lies within the gap
+are enumerated, and an integer program over them is exact.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+from react_opt.models.inspection import FloatArray, InspectionArrays, Routes
+from react_opt.solvers.inspection.control import Control
+from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
+from react_opt.solvers.inspection.local import Searcher
+from react_opt.solvers.inspection.master import Column, Duals, Master, choose
+from react_opt.solvers.inspection.pricing import Pricer, classes_of
+
+VALUE_TOLERANCE = 1e-7  # relative: plans whose values agree within it are worth the same
+COST_TOLERANCE = 1e-7
+HEURISTIC_LABELS, EXACT_LABELS, ENUMERATED_LABELS = 20_000, 3_000_000, 400_000
+MOST_COLUMNS = 40_000  # of the integer program over enumerated routes
+FIRST_PORTION = 400
+PORTION = 2000
+LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing limits the search
+MIP_NODES = 2000  # of an integer program under a work limit
+SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
+
+
+@dataclass
+class Answer:
+    """What is known of an instance.
+
+    Parameters
+    ----------
+    routes
+        Best routes by value, then second objective; None where none are known.
+    value, cost
+        Their value and second objective; meaningless without routes.
+    value_bound
+        Proven upper bound on the value.
+    cost_bound
+        Proven lower bound on the second objective of plans of the best value; None where unknown.
+    infeasible
+        Whether it is proven that some class of robots has no route.
+    stuck
+        Whether labels or columns outgrew their limits, so that the search ended without a proof.
+    notes
+        Counts: columns, pricings, routes enumerated.
+    """
+
+    routes: Routes | None = None
+    value: float = -math.inf
+    cost: float = math.inf
+    value_bound: float = math.inf
+    cost_bound: float | None = None
+    infeasible: bool = False
+    stuck: bool = False
+    notes: dict[str, int] = field(default_factory=dict)
+
+
+def grid_of(values: FloatArray) -> float:
+    """Return the coarsest step of which all values are multiples, 0 where it is finer than 1e-5 of the largest."""
+    numerator, denominator = 0, 1
+    for value in values.tolist():
+        exact = Fraction(repr(value))
+        common = math.lcm(denominator, exact.denominator)
+        if common > 10**7:
+            return 0.0
+        numerator = math.gcd(numerator * (common // denominator), exact.numerator * (common // exact.denominator))
+        denominator = common
+    step = numerator / denominator
+    return step if len(values) and step > 1e-5 * float(values.max()) else 0.0
+
+
+class Decomposition:
+    """The two stages on one instance.
+
+    Parameters
+    ----------
+    arrays
+        The problem.
+    control
+        When to stop.
+    threads, seed
+        With two or more threads, and no work limit, local search runs beside the proof.
+    gap
+        Relative gap of the value at which to stop; 0 to prove.
+    routes
+        Feasible routes known; None for none.
+    on_bound
+        Called with value and bound when either improves; None for never.
+    """
+
+    def __init__(
+        self,
+        arrays: InspectionArrays,
+        control: Control,
+        *,
+        threads: int = 1,
+        seed: int = 0,
+        gap: float = 0.0,
+        routes: Routes | None = None,
+        on_bound: Callable[[float | None, float], None] | None = None,
+    ) -> None:
+        self.arrays, self.control, self.seed, self.gap, self.on_bound = arrays, control, seed, gap, on_bound
+        self.robots, self.sizes, self.group = classes_of(arrays)
+        self.pricers = [Pricer(arrays, c, robot) for c, robot in enumerate(self.robots)]
+        self.master = Master(arrays, self.sizes)
+        self.answer = Answer()
+        self.grid = grid_of(arrays.value)
+        self.searcher: Searcher | None = None
+        self.beside = threads > 1 and control.work_limit is None and len(arrays.value) > SMALL
+        self.notes = self.answer.notes
+        self._thread: threading.Thread | None = None
+        empty: Routes = [[] for _ in arrays.time_s]
+        for start in (routes, empty):
+            if start is not None and arrays.is_feasible(start):
+                self.offer(start)
+
+    def run(self, second: bool = True) -> Answer:
+        """Solve as far as the control lets it, the first stage alone where not ``second``; see :class:`Answer`."""
+        answer = self.answer
+        answer.value_bound = self._simple_bound()
+        self._search(FIRST_PORTION)
+        if self.beside:
+            self._thread = threading.Thread(target=self._search_on, daemon=True)
+            self._thread.start()
+        proven = self._value_proven() or self._stage(second=False)
+        if proven and not answer.infeasible and answer.routes is not None:
+            if self.gap == 0.0:
+                answer.value_bound = answer.value
+            proven = not second or self._stage(second=True)
+            if proven and second:
+                answer.cost_bound = answer.cost
+        if not proven and not answer.infeasible:
+            portions = 0
+            while not self.control.stopped() and answer.routes is not None:
+                portions += 1
+                if self.control.deadline is None and portions > LAST_PORTIONS:
+                    break
+                self._search(PORTION)
+        self.control.flag[0] = 1
+        if self._thread is not None:
+            self._thread.join()
+            self._collect()
+        self.notes.update(columns=len(self.master.columns), work=self.control.work)
+        return answer
+
+    # --- plans known ---
+
+    def offer(self, routes: Routes) -> bool:
+        """Keep routes where they are better; True where they were."""
+        value, cost = self.arrays.worth(routes)
+        answer = self.answer
+        rounding = VALUE_TOLERANCE * max(1.0, abs(value)) * 0.01
+        better = value > answer.value + rounding
+        cheaper = value > answer.value - rounding and cost < answer.cost - 1e-9 * max(1.0, cost)
+        if answer.routes is not None and not better and not cheaper:
+            return False
+        answer.routes, answer.value, answer.cost = [list(route) for route in routes], value, cost
+        self.master.add(self._columns(routes))
+        if better and self.on_bound is not None:
+            self.on_bound(value, answer.value_bound)
+        return True
+
+    def _columns(self, routes: Routes) -> list[Column]:
+        return [self.pricers[self.group[r]].column(tuple(route)) for r, route in enumerate(routes)]
+
+    def _routes(self, chosen: list[Column]) -> Routes:
+        waiting: list[list[tuple[int, ...]]] = [[] for _ in self.sizes]
+        for column in chosen:
+            waiting[column.group].append(column.stops)
+        return [list(waiting[c].pop()) for c in self.group.tolist()]
+
+    def _search(self, iterations: int) -> None:
+        """Run a portion of local search here, or collect what the one beside has found."""
+        if self._thread is not None:
+            self._thread.join(0.02)
+            self._collect()
+            return
+        if self.answer.routes is None or not len(self.arrays.value):
+            return
+        if self.searcher is None:
+            self.searcher = Searcher(self.arrays, self.answer.routes, self.seed, self.control.flag)
+        self.control.work += 1
+        known = self.answer.routes
+        if known is not self.searcher.routes:
+            self.searcher.offer(known)
+        self.offer(self.searcher.run(iterations))
+
+    def _search_on(self) -> None:
+        while self.control.flag[0] == 0 and self.searcher is not None:
+            self.searcher.run(PORTION)
+
+    def _collect(self) -> None:
+        if self.searcher is not None:
+            self.offer(self.searcher.routes)
+
+    # --- bounds ---
+
+    def _simple_bound(self) -> float:
+        """Value of the targets that some robot can visit: as a first stop, where no detour is ever shorter."""
+        arrays, n = self.arrays, len(self.arrays.value)
+        within = np.zeros(n, np.bool_)
+        for pricer in self.pricers:
+            if not pricer.metric:
+                return float(arrays.value.sum())
+            t = pricer.time_s[n, :n] + pricer.time_s[:n, n + 1]
+            e = pricer.energy_j[n, :n] + pricer.energy_j[:n, n + 1]
+            within |= (t <= arrays.time_limit_s) & (e <= pricer.energy_limit)
+        return float(arrays.value[within].sum())
+
+    def _value_slack(self) -> float:
+        value = self.answer.value
+        return max(VALUE_TOLERANCE * abs(value), self.gap * abs(value))
+
+    def _value_proven(self) -> bool:
+        answer = self.answer
+        return answer.routes is not None and answer.value_bound <= answer.value + self._value_slack()
+
+    def _cost_proven(self) -> bool:
+        answer = self.answer
+        bound = answer.cost_bound
+        return bound is not None and bound >= answer.cost - COST_TOLERANCE * max(1.0, answer.cost)
+
+    def _bound(self, duals: Duals, best: list[float], second: bool) -> None:
+        """Lower the bound by what these prices prove; ``best`` is the largest profit per class."""
+        answer = self.answer
+        earned = sum(size * profit for size, profit in zip(self.sizes, best, strict=True))
+        if second:
+            bound = duals.value * (self.master.least_value or 0.0) + float(duals.target.sum()) - earned
+            answer.cost_bound = max(bound, answer.cost_bound or 0.0)
+            return
+        bound = earned - float(duals.target.sum())
+        if self.grid > 0:
+            bound = math.floor(bound / self.grid + 1e-6) * self.grid
+        if bound < answer.value_bound:
+            answer.value_bound = max(bound, answer.value)
+            if self.on_bound is not None:
+                self.on_bound(answer.value if answer.routes is not None else None, answer.value_bound)
+
+    # --- a stage ---
+
+    def _stage(self, second: bool) -> bool:
+        """Solve one stage; True where its objective is proven."""
+        if second:
+            value = self.answer.value
+            slack = self.grid / 2 if self.grid > 0 else VALUE_TOLERANCE * max(1.0, abs(value))
+            self.master.second_stage(value - slack)
+        done = self._cost_proven if second else self._value_proven
+        duals = self._generate(second)
+        if self.answer.infeasible or done():
+            return True
+        if duals is None:
+            return False
+        self._search(PORTION)
+        return done() or self._enumerate(duals, second) or done()
+
+    def _generate(self, second: bool) -> Duals | None:
+        """Price until no route improves the linear program; its duals, None where it was stopped."""
+        done = self._cost_proven if second else self._value_proven
+        rate = 1.0 if second else 0.0
+        while not self.control.stopped():
+            duals = self.master.solve()
+            if duals is None:
+                return None
+            self._integral(second)
+            if done():
+                return None
+            prize = duals.value * self.arrays.value + duals.target
+            eps = 1e-7 * max(1.0, abs(duals.objective))
+            threshold = [-float(price) + eps for price in duals.group]
+            if self._price(prize, rate, threshold, HEURISTIC):
+                if self._thread is not None:
+                    self._collect()
+                continue
+            best = self._price_exactly(prize, rate, threshold)
+            if best is None:
+                return None
+            if duals.stand_in < 1e-6:
+                self._bound(duals, [max(profit, t) for profit, t in zip(best[0], threshold, strict=True)], second)
+            if done():
+                return None
+            if not best[1]:
+                if duals.stand_in > 1e-6:
+                    self.answer.infeasible = True
+                    return None
+                return duals
+        return None
+
+    def _price(self, prize: FloatArray, rate: float, threshold: list[float], mode: int) -> bool:
+        added = 0
+        for pricer, least in zip(self.pricers, threshold, strict=True):
+            self.control.work += 1
+            found = pricer.price(prize, rate, least, mode, HEURISTIC_LABELS, 15, self.control.flag)
+            added += self.master.add(found.columns)
+        return added > 0
+
+    def _price_exactly(
+        self,
+        prize: FloatArray,
+        rate: float,
+        threshold: list[float],
+    ) -> tuple[list[float], int] | None:
+        """Return the largest profits and the number of new columns, None where labels or time ran out."""
+        best, added, whole = [], 0, True
+        for pricer, least in zip(self.pricers, threshold, strict=True):
+            self.control.work += 1
+            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, 25, self.control.flag)
+            added += self.master.add(found.columns)
+            if found.best is None:
+                whole = False
+                break
+            best.append(found.best)
+        if whole:
+            return best, added
+        self.answer.stuck = self.answer.stuck or self.control.flag[0] == 0
+        return None
+
+    def _integral(self, second: bool) -> None:
+        """Keep the solution of the linear program where it happens to be whole."""
+        x = self.master.x
+        used = np.flatnonzero(x > 1e-6)
+        if np.abs(x[used] - np.round(x[used])).max(initial=0.0) > 1e-6:
+            return
+        chosen = [self.master.columns[p] for p in used.tolist() for _ in range(round(float(x[p])))]
+        if len(chosen) == len(self.group):
+            routes = self._routes(chosen)
+            if self.arrays.is_feasible(routes):
+                self.offer(routes)
+
+    def _enumerate(self, duals: Duals, second: bool) -> bool:
+        """Enumerate what lies within the gap and choose; True where that proves the stage."""
+        answer = self.answer
+        rate = 1.0 if second else 0.0
+        prize = duals.value * self.arrays.value + duals.target
+        if second:
+            gap = answer.cost - (answer.cost_bound or 0.0)
+        else:
+            least = answer.value + max(self.grid, self._value_slack()) if answer.routes is not None else 0.0
+            gap = -duals.objective - least
+        gap += 1e-6 * max(1.0, abs(duals.objective))
+        columns: list[Column] = []
+        whole = True
+        for pricer, price in zip(self.pricers, duals.group.tolist(), strict=True):
+            self.control.work += 1
+            found = pricer.price(
+                prize, rate, -price - gap, ENUMERATE, ENUMERATED_LABELS, MOST_COLUMNS, self.control.flag
+            )
+            whole = whole and found.best is not None and len(found.columns) < MOST_COLUMNS
+            columns += found.columns
+        self.notes["enumerated"] = self.notes.get("enumerated", 0) + len(columns)
+        if not whole or len(columns) > MOST_COLUMNS:
+            answer.stuck = answer.stuck or self.control.flag[0] == 0
+            columns = [column for column in self.master.columns if len(set(column.stops)) == len(column.stops)]
+        start = None if answer.routes is None else self._columns(answer.routes)
+        known = {(column.group, column.stops) for column in columns}
+        columns += [column for column in dict.fromkeys(start or []) if (column.group, column.stops) not in known]
+        left_s = self.control.left_s()
+        if not whole and left_s is not None:
+            left_s *= 0.3
+        nodes = MIP_NODES if self.control.work_limit is not None or (not whole and left_s is None) else None
+        found_mip = choose(self.arrays, self.sizes, columns, self.master.least_value, start, left_s, nodes, self.seed)
+        if found_mip.chosen is not None:
+            self.offer(self._routes(found_mip.chosen))
+        return whole and found_mip.complete

@@ -1,0 +1,235 @@
+"""The restricted master of the inspection: which routes, as a linear program and as a small integer program.
+
+    stage 1   max sum value_p x_p       stage 2   min sum cost_p x_p,  sum value_p x_p >= value*
+    s.t.      sum_p a_kp x_p <= 1 per target,     sum_p in class c x_p = robots of class c,     x_p >= 0
+
+HiGHS minimises, so stage 1 minimises ``-value``. A column of large cost stands in for a class without a route.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import highspy
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.models.inspection import FloatArray, InspectionArrays
+
+STAND_IN = 1e7  # relative to the largest coefficient
+
+
+@dataclass(frozen=True)
+class Column:
+    """A route of a class of robots: its stops, value and second objective (s or J)."""
+
+    group: int
+    stops: tuple[int, ...]
+    value: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Duals:
+    """Prices of the restricted master in its present stage.
+
+    Parameters
+    ----------
+    target
+        ``(N,)`` reduced cost per visit, <= 0.
+    group
+        ``(C,)`` reduced cost per route of a class.
+    value
+        Worth of one unit of value: 1 in stage 1, the price of the value row in stage 2.
+    objective
+        Value of the linear program, minimised.
+    stand_in
+        Routes that stand-ins take.
+    """
+
+    target: FloatArray
+    group: FloatArray
+    value: float
+    objective: float
+    stand_in: float
+
+
+class Master:
+    """The restricted master with its columns.
+
+    Parameters
+    ----------
+    arrays
+        The problem.
+    sizes
+        ``(C,)`` robots per class.
+    """
+
+    def __init__(self, arrays: InspectionArrays, sizes: list[int]) -> None:
+        self.arrays, self.sizes = arrays, sizes
+        self.columns: list[Column] = []
+        self.least_value: float | None = None
+        self._known: set[tuple[int, tuple[int, ...]]] = set()
+        self._n = len(arrays.value)
+        self._solver = quiet()
+        n, groups = self._n, len(sizes)
+        inf = highspy.kHighsInf
+        lower = np.concatenate([np.full(n, -inf), np.array(sizes, dtype=np.float64), [-inf]])
+        upper = np.concatenate([np.ones(n), np.array(sizes, dtype=np.float64), [inf]])
+        empty = np.empty(0, dtype=np.int32)
+        self._solver.addRows(n + groups + 1, lower, upper, 0, np.zeros(n + groups + 1, np.int32), empty, np.empty(0))
+        self._stand_in = STAND_IN * max(1.0, float(arrays.value.sum()))
+        for c in range(groups):
+            self._solver.addCol(self._stand_in, 0.0, inf, 1, np.array([n + c], np.int32), np.ones(1))
+
+    def add(self, columns: list[Column]) -> int:
+        """Add columns that are not there yet; return how many were new."""
+        new = []
+        for column in columns:
+            key = (column.group, column.stops)
+            if key not in self._known:
+                self._known.add(key)
+                new.append(column)
+        if new:
+            cost, start, index, value = _matrix(new, self._n, len(self.sizes), self.least_value is not None)
+            m = len(new)
+            self._solver.addCols(m, cost, np.zeros(m), np.full(m, highspy.kHighsInf), len(index), start, index, value)
+            self.columns += new
+        return len(new)
+
+    def second_stage(self, least_value: float) -> None:
+        """Minimise the second objective over plans of at least this value."""
+        self.least_value = least_value
+        groups, m = len(self.sizes), len(self.columns)
+        self._solver.changeRowBounds(self._n + groups, least_value, highspy.kHighsInf)
+        index = np.arange(groups, groups + m, dtype=np.int32)
+        self._solver.changeColsCost(m, index, np.array([column.cost for column in self.columns]))
+        largest = max((column.cost for column in self.columns), default=1.0)
+        stand_in = np.full(groups, STAND_IN * max(1.0, largest))
+        self._solver.changeColsCost(groups, np.arange(groups, dtype=np.int32), stand_in)
+
+    def solve(self) -> Duals | None:
+        """Solve the linear program; None where the solver gives no optimum."""
+        self._solver.run()
+        if self._solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+            return None
+        solution = self._solver.getSolution()
+        dual = np.array(solution.row_dual)
+        n, groups = self._n, len(self.sizes)
+        self.x = np.array(solution.col_value)[groups:]
+        worth = 1.0 if self.least_value is None else max(0.0, float(dual[n + groups]))
+        objective = float(self._solver.getInfo().objective_function_value)
+        stand_in = float(np.array(solution.col_value)[:groups].sum())
+        return Duals(np.minimum(dual[:n], 0.0), dual[n : n + groups], worth, objective, stand_in)
+
+
+def quiet() -> highspy.Highs:
+    """Return a HiGHS that is silent and runs on one thread."""
+    solver = highspy.Highs()
+    solver.setOptionValue("output_flag", False)
+    solver.setOptionValue("threads", 1)
+    solver.setOptionValue("primal_feasibility_tolerance", 1e-9)
+    solver.setOptionValue("dual_feasibility_tolerance", 1e-9)
+    return solver
+
+
+def _matrix(
+    columns: list[Column], n: int, groups: int, second: bool
+) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.int32], FloatArray]:
+    """Return costs, and the columns of the matrix by starts, rows and values."""
+    cost = np.array([column.cost if second else -column.value for column in columns])
+    start: list[int] = []
+    index: list[int] = []
+    value: list[float] = []
+    for column in columns:
+        start.append(len(index))
+        seen: dict[int, float] = {}
+        for k in column.stops:
+            seen[k] = seen.get(k, 0.0) + 1.0
+        index += [*seen, n + column.group, n + groups]
+        value += [*seen.values(), 1.0, column.value]
+    return cost, np.array(start, np.int32), np.array(index, np.int32), np.array(value, np.float64)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the integer program found: columns chosen (None: nothing), its proven bound (minimised), and whether
+    it ran to its end.
+    """
+
+    chosen: list[Column] | None
+    bound: float
+    complete: bool
+
+
+def choose(
+    arrays: InspectionArrays,
+    sizes: list[int],
+    columns: list[Column],
+    least_value: float | None,
+    start: list[Column] | None,
+    time_limit_s: float | None,
+    node_limit: int | None,
+    seed: int,
+) -> Choice:
+    """Solve the integer program over some columns with HiGHS.
+
+    Parameters
+    ----------
+    arrays, sizes, columns
+        The problem, robots per class, and the columns to choose from.
+    least_value
+        None in stage 1, else the value that stage 2 keeps.
+    start
+        Columns of a feasible choice, all among ``columns``; None for none.
+    time_limit_s, node_limit
+        Limits; None for none.
+    seed
+        Seed of the solver.
+    """
+    n, groups, m = len(arrays.value), len(sizes), len(columns)
+    cost, starts, index, value = _matrix(columns, n, groups, least_value is not None)
+    inf = highspy.kHighsInf
+    solver = quiet()
+    solver.setOptionValue("mip_rel_gap", 1e-9)
+    solver.setOptionValue("mip_abs_gap", 1e-9)
+    solver.setOptionValue("random_seed", seed % (2**31 - 1))
+    if time_limit_s is not None:
+        solver.setOptionValue("time_limit", max(0.0, time_limit_s))
+    if node_limit is not None:
+        solver.setOptionValue("mip_max_nodes", node_limit)
+    lp = highspy.HighsLp()
+    lp.num_col_, lp.num_row_ = m, n + groups + 1
+    lp.col_cost_, lp.col_lower_, lp.col_upper_ = cost, np.zeros(m), np.ones(m)
+    size = np.array(sizes, dtype=np.float64)
+    least = -inf if least_value is None else least_value
+    lp.row_lower_ = np.concatenate([np.full(n, -inf), size, [least]])
+    lp.row_upper_ = np.concatenate([np.ones(n), size, [inf]])
+    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    lp.a_matrix_.start_ = np.append(starts, len(index))
+    lp.a_matrix_.index_, lp.a_matrix_.value_ = index, value
+    # An empty route may be chosen by every robot of its class; every other column visits something, once.
+    lp.col_upper_ = np.array([1.0 if column.stops else float(sizes[column.group]) for column in columns])
+    lp.integrality_ = [highspy.HighsVarType.kInteger] * m
+    solver.passModel(lp)
+    if start is not None:
+        x = np.zeros(m)
+        number = {(column.group, column.stops): at for at, column in enumerate(columns)}
+        for column in start:
+            x[number[column.group, column.stops]] += 1.0
+        solution = highspy.HighsSolution()
+        solution.col_value = x.tolist()
+        solver.setSolution(solution)
+    solver.run()
+    complete = solver.getModelStatus() in (
+        highspy.HighsModelStatus.kOptimal,
+        highspy.HighsModelStatus.kInfeasible,
+    )
+    info = solver.getInfo()
+    if solver.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
+        return Choice(None, np.inf, True)
+    if info.primal_solution_status != 2:
+        return Choice(None, float(info.mip_dual_bound), complete)
+    count = np.round(np.array(solver.getSolution().col_value)).astype(int)
+    chosen = [column for column, times in zip(columns, count.tolist(), strict=True) for _ in range(times)]
+    return Choice(chosen, float(info.mip_dual_bound), complete)

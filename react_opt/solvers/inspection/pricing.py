@@ -1,0 +1,185 @@
+"""Routes worth adding: the pricing problem of each class of robots, heuristically and exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.kernels import kernel
+from react_opt.models.inspection import FloatArray, InspectionArrays, IntArray
+from react_opt.solvers.inspection.labels import EXACT, HEURISTIC, MOST_BUCKETS, best_routes
+from react_opt.solvers.inspection.master import Column
+
+ELEMENTARY_UP_TO = 40  # targets; above, routes remember a neighbourhood
+NEIGHBOURHOOD = 8
+WORTH_NOTHING = 1e-9
+
+
+@kernel
+def is_metric(time_s: FloatArray, energy_j: FloatArray) -> bool:
+    """Whether no detour over a target is shorter than the direct drive, in time or in energy."""
+    n = len(time_s) - 2
+    for k in range(n):
+        for i in range(n + 1):
+            if i == k:
+                continue
+            for j in range(n + 2):
+                if j in (i, k, n):
+                    continue
+                slack = 1e-9 * (1.0 + time_s[i, j])
+                if time_s[i, k] + time_s[k, j] < time_s[i, j] - slack:
+                    return False
+                if energy_j[i, k] + energy_j[k, j] < energy_j[i, j] - 1e-9 * (1.0 + energy_j[i, j]):
+                    return False
+    return True
+
+
+@dataclass(frozen=True)
+class Priced:
+    """What one pricing found.
+
+    Parameters
+    ----------
+    columns
+        Routes above the threshold, best first.
+    best
+        Largest profit of any route (of the relaxation), the threshold where none exceeds it; None where the
+        search was not exact.
+    labels
+        Labels made.
+    """
+
+    columns: list[Column]
+    best: float | None
+    labels: int
+
+
+class Pricer:
+    """Pricing of one class of robots.
+
+    Parameters
+    ----------
+    arrays
+        The problem.
+    group, robot
+        Number of the class, and a robot of it.
+    """
+
+    def __init__(self, arrays: InspectionArrays, group: int, robot: int) -> None:
+        self.group, self.robot, self.arrays = group, robot, arrays
+        self.time_s = np.ascontiguousarray(arrays.time_s[robot])
+        self.energy_j = np.ascontiguousarray(arrays.energy_j[robot])
+        self.cost = self.time_s if arrays.by_time else self.energy_j
+        self.energy_limit = float(arrays.energy_limit_j[robot])
+        n = len(arrays.value)
+        self.n, self.words = n, max(1, (n + 63) // 64)
+        self.metric = bool(is_metric(self.time_s, self.energy_j))
+        self.elementary = n <= ELEMENTARY_UP_TO
+        self.everything = _bits([range(n)] * n, n, self.words)
+        self.memory = self.everything if self.elementary else self._neighbourhoods()
+        self.buckets = (
+            _bucket_count(self.time_s, arrays.time_limit_s, n), _bucket_count(self.energy_j, self.energy_limit, n)
+        )  # fmt: skip
+
+    def _neighbourhoods(self) -> NDArray[np.uint64]:
+        near = np.argsort(self.time_s[: self.n, : self.n].T - 1e18 * np.eye(self.n), axis=1, kind="stable")
+        return _bits(near[:, :NEIGHBOURHOOD].tolist(), self.n, self.words)
+
+    def price(
+        self,
+        prize: FloatArray,
+        rate: float,
+        threshold: float,
+        mode: int,
+        most: int,
+        count: int,
+        stop: NDArray[np.uint8],
+    ) -> Priced:
+        """Return routes whose profit exceeds a threshold.
+
+        Parameters
+        ----------
+        prize, rate
+            ``(N,)`` prizes and the weight of the second objective.
+        threshold
+            Profit to exceed.
+        mode
+            ``HEURISTIC``, ``EXACT`` or ``ENUMERATE``.
+        most
+            Labels at most.
+        count
+            Columns at most.
+        stop
+            ``(1,)`` set to nonzero by another thread to end early.
+        """
+        n = self.n
+        if self.metric and mode in (HEURISTIC, EXACT):
+            prize = np.where(prize > WORTH_NOTHING, prize, -np.inf)
+        memory = self.memory if mode == EXACT else self.everything
+        node, parent = np.empty(most, np.int64), np.empty(most, np.int64)
+        profit, final = np.empty(most), np.empty(most)
+        mask = np.empty((most, self.words), np.uint64)
+        made = best_routes(
+            prize, rate, self.cost, self.time_s, self.energy_j, self.arrays.time_limit_s, self.energy_limit, memory,
+            self.metric, threshold, mode, *self.buckets, most, stop, node, parent, profit, mask, final,
+        )  # fmt: skip
+        size = abs(made)
+        good = np.flatnonzero(final[:size] > threshold)
+        best = None
+        if made > 0 and mode != HEURISTIC:
+            best = float(final[good].max()) if len(good) else threshold
+        order = good[np.argsort(-final[good], kind="stable")]
+        columns: list[Column] = []
+        seen: dict[frozenset[int], int] = {}
+        for label in order.tolist():
+            if len(columns) >= count:
+                break
+            stops: list[int] = []
+            at = label
+            while node[at] < n:
+                stops.append(int(node[at]))
+                at = int(parent[at])
+            stops.reverse()
+            column = self.column(tuple(stops))
+            key = frozenset(stops) if len(set(stops)) == len(stops) else frozenset([-label])
+            if key not in seen:
+                seen[key] = len(columns)
+                columns.append(column)
+            elif column.cost < columns[seen[key]].cost:
+                columns[seen[key]] = column
+        return Priced(columns, best, size)
+
+    def column(self, stops: tuple[int, ...]) -> Column:
+        """Return a route as a column."""
+        time_s, energy_j = self.arrays.totals(self.robot, stops)
+        value = float(self.arrays.value[list(stops)].sum())
+        return Column(self.group, stops, value, time_s if self.arrays.by_time else energy_j)
+
+
+def _bits(members: list[range] | list[list[int]], n: int, words: int) -> NDArray[np.uint64]:
+    bits = np.zeros((n, words), np.uint64)
+    for row, those in enumerate(members):
+        for k in those:
+            bits[row, k >> 6] |= np.uint64(1) << np.uint64(k & 63)
+    return bits
+
+
+def _bucket_count(resource: FloatArray, limit: float, n: int) -> int:
+    """Return buckets such that every drive between targets leaves its bucket, 0 where that takes too many."""
+    inner = resource[:n, :n]
+    least = float(inner.min(initial=np.inf))
+    if least <= 0 or limit <= 0:
+        return 0
+    count = int(np.ceil(limit / least)) + 1
+    return 0 if count > MOST_BUCKETS else max(count, min(100, 4 * n))
+
+
+def classes_of(arrays: InspectionArrays) -> tuple[list[int], list[int], IntArray]:
+    """Return per class a robot and the number of robots, and ``(R,)`` the class of each robot."""
+    first = arrays.classes
+    robots = sorted(set(first.tolist()))
+    number = {robot: index for index, robot in enumerate(robots)}
+    group = np.array([number[int(r)] for r in first], dtype=np.int64)
+    return robots, [int((group == c).sum()) for c in range(len(robots))], group
