@@ -191,10 +191,13 @@ def run(program: Program, request: Request, watch: Watch, variant: str = "") -> 
     claim = Claim("no_solution", settings=dict(options), notes=notes)
     try:
         problem.solve(solver=solver, **options)
+        status = problem.status
     except cp.SolverError as error:
         notes.append(f"cvxpy: {error}")
-    status = problem.status
-    if variables and all(x.value is not None for x in variables.values()):
+        status = None
+    if status in (None, cp.settings.INFEASIBLE_OR_UNBOUNDED):
+        status = _told_apart(problem, solver, request, watch, status)
+    if status is not None and variables and all(x.value is not None for x in variables.values()):
         claim.x = np.concatenate([np.atleast_1d(x.value) for x in variables.values()])
     claim.bound = _bound(problem, program)
     if status == cp.OPTIMAL:
@@ -211,6 +214,23 @@ def run(program: Program, request: Request, watch: Watch, variant: str = "") -> 
     elif status is not None:
         notes.append(f"cvxpy: {solver} stopped with the status {status!r}")
     return claim
+
+
+def _told_apart(problem: Any, solver: str, request: Request, watch: Watch, status: Any) -> Any:
+    """Return what a solver that knows nothing, or not which of the two, says of the program without its objective."""
+    cp = _cvxpy()
+    left_s = watch.remaining_s()
+    if watch.stopped():
+        return status
+    options = _OPTIONS[solver](request, left_s) if solver in _OPTIONS else {}
+    without = cp.Problem(cp.Minimize(0), problem.constraints)
+    try:
+        without.solve(solver=solver, **options)
+    except cp.SolverError:
+        return status
+    if without.status == cp.INFEASIBLE:
+        return cp.INFEASIBLE
+    return cp.UNBOUNDED if without.status == cp.OPTIMAL and status is not None else status
 
 
 def _loosened(objective: float, request: Request, maximise: bool) -> float:

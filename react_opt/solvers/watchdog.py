@@ -58,6 +58,8 @@ def supervise(
     watch = Watch(program.maximise, None if limit_s is None else started + limit_s)
     if program.n_columns == 0:
         claim = _without_columns(program)
+    elif watch.stopped():
+        claim = Claim("no_solution")
     else:
         claim = _in_thread(watch, request, started, run)
     give_up = None if limit_s is None else started + 1.07 * limit_s + 0.07
