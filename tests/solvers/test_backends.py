@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from small_programs import battery, hard, knapsack
 
 from react_opt.errors import MissingPartError, UsageError
 from react_opt.models.program import Program
@@ -21,49 +22,6 @@ NAMES = ["highs", "cp-sat", "scip", "cvxpy:SCIP", "cvxpy:HIGHS", "cvxpy:SCIPY"]
 @pytest.fixture(params=NAMES)
 def solver(request: pytest.FixtureRequest) -> Backend:
     return backend(request.param)
-
-
-def knapsack(*, maximise: bool = True) -> Program:
-    """Items of value 10, 13, 7 and weight 3, 4, 2 in a sack of 6: the last two (20) beat the first and third (17)."""
-    program = Program("sack", maximise)
-    sign = 1.0 if maximise else -1.0
-    take = program.add_columns("take", [0, 1, 2], cost=sign * np.array([10.0, 13.0, 7.0]), upper=1.0, integer=True)
-    program.add_rows("weight", [0], row=[0, 0, 0], column=take, value=[3.0, 4.0, 2.0], upper=6.0)
-    return program
-
-
-def battery() -> Program:
-    """Two moves earn 1 each and cost 2.5 J of 4 J: only one is made, and 1.5 J at 0.01 each are left: 1.015."""
-    program = Program("battery")
-    move = program.add_columns("move", [0, 1], cost=1.0, upper=1.0, integer=True)
-    left = program.add_columns("b", [0, 1, 2], cost=[0.0, 0.0, 0.01], upper=4.0)
-    program.add_rows(
-        "balance",
-        [0, 1, 2],
-        row=[0, 1, 1, 1, 2, 2, 2],
-        column=[left[0], left[1], left[0], move[0], left[2], left[1], move[1]],
-        value=[1.0, 1.0, -1.0, 2.5, 1.0, -1.0, 2.5],
-        lower=[4.0, 0.0, 0.0],
-        upper=[4.0, 0.0, 0.0],
-    )
-    return program
-
-
-def hard(n: int = 150, m: int = 15) -> Program:
-    """A multi-dimensional knapsack that no solver here closes in the time that the tests give it."""
-    rng = np.random.default_rng(0)
-    program = Program("hard")
-    take = program.add_columns("take", np.arange(n), cost=rng.integers(10, 100, n), upper=1.0, integer=True)
-    weight = rng.integers(5, 60, (m, n))
-    program.add_rows(
-        "weight",
-        np.arange(m),
-        row=np.repeat(np.arange(m), n),
-        column=np.tile(take, m),
-        value=weight.ravel(),
-        upper=weight.sum(axis=1) // 3,
-    )
-    return program
 
 
 def believable(program: Program, outcome: Outcome) -> None:
