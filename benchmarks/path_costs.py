@@ -19,6 +19,7 @@ from react_opt.energy import RobotProfile
 from react_opt.geometry import load_map
 from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
 from react_opt.paths.exact import exact_costs
+from react_opt.paths.ompl_ import OmplPathCosts
 from react_opt.paths.protocol import PathCosts
 
 FACTORY = Path(__file__).parent.parent / "examples" / "factory" / "factory.yaml"
@@ -49,6 +50,8 @@ ROWS: list[tuple[str, Callable[[FreeSpace], PathCosts]]] = [
     ("dijkstra16", lambda space: exact_costs(space, JACKAL, method="dijkstra16")),
     ("fastest8", lambda space: exact_costs(space, JACKAL, method="fastest8")),
     ("fastest16", lambda space: exact_costs(space, JACKAL, method="fastest16")),
+    ("ompl prm*", lambda space: OmplPathCosts(space, JACKAL)),
+    ("ompl time", lambda space: OmplPathCosts(space, JACKAL, minimise="time")),
 ]
 
 

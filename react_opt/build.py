@@ -93,7 +93,7 @@ def build(
         Side of an area, m; time to plan for and length of a step, s. What is left of the horizon after its last
         whole step is not planned for.
     paths
-        ``exact``: any-angle shortest paths and fastest pixel paths. ``ompl``: OMPL's PRM*.
+        ``exact``: any-angle shortest paths and fastest pixel paths. ``ompl``: both by OMPL's PRM*.
     unknown
         How unknown pixels count.
     name

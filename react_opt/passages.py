@@ -47,7 +47,7 @@ class Passages:
     step_s
         Length of a step, s.
     kind
-        ``exact`` (shortest any-angle and fastest pixel paths) or ``ompl`` (PRM*).
+        ``exact`` (shortest any-angle and fastest pixel paths) or ``ompl`` (shortest and fastest by PRM*).
     """
 
     def __init__(
@@ -104,7 +104,10 @@ class Passages:
 
         free_m2 = np.count_nonzero(space.blocked == 0) * space.resolution_m**2
         samples = int(np.clip(_SAMPLES_PER_M2 * free_m2, 64, 2000))
-        return [[OmplPathCosts(space, each, samples=samples)] for each in self.profiles]
+        return [
+            [OmplPathCosts(space, each, samples=samples, minimise=what) for what in ("length", "time")]
+            for each in self.profiles
+        ]
 
     @cached_property
     def _whole(self) -> list[list[PathCosts]]:

@@ -130,7 +130,7 @@ class PixelCosts:
                 continue
             raw = _trace(padded, step, homes[0], homes[n], pixels[0], pixels[n])
             timed = self.minimise == "time"
-            ways.append(_pull_straight(padded, self._field, raw, timed, self._per_radian))
+            ways.append(pull_straight(padded, self._field, raw, timed, self._per_radian))
         return ways
 
 
@@ -278,8 +278,22 @@ def _trace(
 
 
 @kernel
-def _pull_straight(padded: Padded, field: Field, way: FloatArray, timed: bool, per_radian: float) -> FloatArray:
-    """Return a way with every run of way points left out that a free and no slower straight segment replaces."""
+def pull_straight(padded: Padded, field: Field, way: FloatArray, timed: bool, per_radian: float) -> FloatArray:
+    """Return a way with every run of way points left out that a free and no slower straight segment replaces.
+
+    Parameters
+    ----------
+    padded
+        Blocked pixels with their ring.
+    field
+        The map and the robot (:func:`react_opt.paths.motion.terrain`).
+    way
+        ``(k, 2)`` way points in pixel coordinates, every leg free.
+    timed
+        Whether slower means more time, or longer.
+    per_radian
+        What a radian of turning costs, s.
+    """
     count = way.shape[0]
     cost, turns = np.zeros(count), np.zeros(count)  # up to each way point
     for n in range(1, count):

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from itertools import combinations, pairwise
 from types import SimpleNamespace
 from typing import Any, Literal, get_args
@@ -36,11 +37,12 @@ from react_opt.energy import RobotProfile
 from react_opt.errors import MissingPartError, ReactError, UsageError
 from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
 from react_opt.geometry.sight import Padded, segment_free_px
+from react_opt.paths.grid import pull_straight
 from react_opt.paths.motion import polyline_px, terrain, totals
 from react_opt.paths.ompl_child import SearchProcess
 from react_opt.paths.protocol import CostTable, Path
 from react_opt.paths.roadmap import Roadmap, flat_pixels
-from react_opt.paths.sampled import FloatArray, Grids, IntArray, tighten
+from react_opt.paths.sampled import FloatArray, Grids, IntArray, leg_times, tighten
 
 PlannerName = Literal["PRMstar", "BITstar", "InformedRRTstar", "RRTstar", "RRTConnect"]
 PLANNERS: tuple[PlannerName, ...] = get_args(PlannerName)
@@ -263,6 +265,9 @@ class OmplPathCosts:
         process; points in sight of each other are answered without them.
     samples
         Random milestones of the roadmap.
+    minimise
+        ``length``, or ``time`` by the speed law (PRMstar only): the roadmap's legs then cost what they take to drive,
+        and a path keeps away from walls.
     iterations
         How often a single-query planner may ask whether to stop; by default what suits it.
     seed
@@ -287,6 +292,7 @@ class OmplPathCosts:
         *,
         planner: PlannerName = "PRMstar",
         samples: int = 1000,
+        minimise: Literal["length", "time"] = "length",
         iterations: int | None = None,
         seed: int = 0,
         footprint: Literal["disc", "rectangle"] = "disc",
@@ -298,23 +304,25 @@ class OmplPathCosts:
             raise UsageError(f"a footprint is disc or rectangle, not {footprint!r}")
         if samples < 1 or (iterations is not None and iterations < 1) or seed < 0:
             raise UsageError("samples and iterations are at least 1, the seed at least 0")
+        if minimise not in ("length", "time") or (minimise == "time" and planner != "PRMstar"):
+            raise UsageError("OMPL paths minimise length, or with PRMstar time")
         ompl()
         self.space = space
         self.profile = profile
-        self._terrain = terrain(space, profile)
+        self._field = terrain(space, profile)
         drive = space.padded if footprint == "disc" else _straight(space, profile)
         self._grids = Grids(space.padded, drive)
-        self._roadmap = (
-            Roadmap(self._grids, RoadmapPlanner(self._grids, seed).grow, samples, seed)
-            if planner == "PRMstar"
-            else None
-        )
-        self._child: SearchProcess | None = None
-        count = _ITERATIONS.get(planner, 0) if iterations is None else iterations
-        if self._roadmap is None:
-            self._child = SearchProcess(self._grids, planner, count, seed, patience_s)
-        work = f"{samples} samples" if self._roadmap else f"{count} iterations"
-        self.method = f"OMPL {planner}, {work}, seed {seed}, {footprint}, refine {space.refine}"
+        self._timed = minimise == "time"
+        if planner == "PRMstar":
+            planned = RoadmapPlanner(self._grids, seed)
+            self._raw = Roadmap(self._grids, planned.grow, self._weigh, samples, seed).paths
+            work = f"{samples} samples"
+        else:
+            count = _ITERATIONS[planner] if iterations is None else iterations
+            child = SearchProcess(self._grids, planner, count, seed, patience_s)
+            self._raw = partial(_searched_paths, child, self._grids)
+            work = f"{count} iterations"
+        self.method = f"OMPL {planner}, {work}, least {minimise}, seed {seed}, {footprint}, refine {space.refine}"
 
     def cost_table(self, points_m: ArrayLike) -> CostTable:
         """Return length, time and energy of paths between all pairs of ``(n, 2)`` points, m."""
@@ -344,24 +352,29 @@ class OmplPathCosts:
         """Return length, driving time, smallest clearance and turned angle, after testing every leg."""
         if not all(self._grids.leg_free(a, b) for a, b in pairwise(path)):
             raise ReactError("a path failed its check against the footprint")
-        return polyline_px(self._terrain, path)
+        return polyline_px(self._field, path)
 
     def _between(self, pixels: FloatArray, free: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield ``(i, j)``, i < j, and a tightened path in pixels, for every pair that has one."""
+        """Yield ``(i, j)``, i < j, and a polished path in pixels, for every pair that has one."""
         index = np.flatnonzero(free)
-        if self._roadmap is not None:
-            raw = self._roadmap.paths(pixels[index])
-        else:
-            assert self._child is not None
-            raw = _searched_paths(self._child, self._grids, pixels[index])
-        for (i, j), path in raw:
-            yield (int(index[i]), int(index[j])), tighten(self._grids.stand, self._grids.drive, path)
+        for (i, j), path in self._raw(pixels[index]):
+            yield (int(index[i]), int(index[j])), self._polished(path)
+
+    def _weigh(self, nodes: FloatArray, pairs: IntArray) -> FloatArray:
+        if self._timed:
+            return leg_times(self._field, nodes, pairs)
+        return np.asarray(np.hypot(*(nodes[pairs[:, 0]] - nodes[pairs[:, 1]]).T))
+
+    def _polished(self, path: FloatArray) -> FloatArray:
+        if self._timed:
+            return pull_straight(self._grids.drive, self._field, path, True, 1 / self.profile.turn_rad_s)
+        return tighten(self._grids.stand, self._grids.drive, path)
 
 
 def _straight(space: FreeSpace, profile: RobotProfile) -> Padded:
     """Return where a straight drive may go: half the robot's width is enough to either side."""
     width = Footprint(min(profile.width_m / 2, space.footprint.radius_m))
-    return inflate(space.source, width, unknown=space.unknown, refine=space.refine).padded
+    return inflate(space.source, width, unknown=space.unknown, rule=space.rule, refine=space.refine).padded
 
 
 def _searched_paths(

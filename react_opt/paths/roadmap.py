@@ -18,6 +18,7 @@ from react_opt.geometry.sight import Padded
 from react_opt.paths.sampled import FloatArray, Grids, IntArray, flood, join
 
 Grow = Callable[[FloatArray], tuple[FloatArray, IntArray]]
+Weigh = Callable[[FloatArray, IntArray], FloatArray]
 _JOINED = 24
 """Roadmap neighbours of a queried point, at most; they are looked for among four times as many nearest nodes."""
 
@@ -35,15 +36,18 @@ class Roadmap:
         Where the robot may stand and drive.
     grow
         Takes ``(m, 2)`` further milestones in pixel coordinates and returns all nodes and edges of the roadmap.
+    weigh
+        Takes nodes and ``(e, 2)`` pairs of them and returns what each leg costs; least cost is searched for.
     samples
         Random milestones.
     seed
         Seed of the samples; the same seed and the same queries give the same roadmap.
     """
 
-    def __init__(self, grids: Grids, grow: Grow, samples: int, seed: int) -> None:
+    def __init__(self, grids: Grids, grow: Grow, weigh: Weigh, samples: int, seed: int) -> None:
         self._grids = grids
         self._grow = grow
+        self._weigh = weigh
         self._regions = np.asarray(ndimage.label(grids.stand == 0)[0], dtype=np.int32).ravel()
         rows, cols = np.nonzero(grids.stand[1:-1, 1:-1] == 0)
         rng = np.random.default_rng(seed)
@@ -66,7 +70,7 @@ class Roadmap:
         -------
         nodes, graph
             ``(n + v, 2)`` pixel coordinates, the points first, and the symmetric ``(n + v, n + v)`` graph of
-            lengths in pixels.
+            costs.
         """
         for spacing in (8, 3, 1):
             nodes, graph = self._joined(points)
@@ -77,7 +81,7 @@ class Roadmap:
         return self._joined(points)
 
     def paths(self, points: FloatArray) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield ``(i, j)``, i < j, and the shortest path in the graph, for every pair of points that has one.
+        """Yield ``(i, j)``, i < j, and the cheapest path in the graph, for every pair of points that has one.
 
         Parameters
         ----------
@@ -88,9 +92,9 @@ class Roadmap:
         if n < 2:
             return
         nodes, graph = self.graph(points)
-        lengths, before = dijkstra(graph, indices=np.arange(n), return_predecessors=True)
+        costs, before = dijkstra(graph, indices=np.arange(n), return_predecessors=True)
         for i, j in combinations(range(n), 2):
-            if np.isfinite(lengths[i, j]):
+            if np.isfinite(costs[i, j]):
                 trail = [j]
                 while trail[-1] != i:
                     trail.append(int(before[i, trail[-1]]))
@@ -111,9 +115,9 @@ class Roadmap:
             edges.append(np.stack((point, node + n), axis=1))
         low, high = np.sort(np.concatenate(edges), axis=1).T
         pairs = np.stack(np.divmod(np.unique(low * len(nodes) + high), len(nodes)), axis=1)
-        lengths = np.hypot(*(nodes[pairs[:, 0]] - nodes[pairs[:, 1]]).T)
+        costs = np.maximum(self._weigh(nodes, pairs), 1e-12)  # 0 would be no edge
         both = np.concatenate((pairs, pairs[:, ::-1]))
-        weights = np.maximum(np.concatenate((lengths, lengths)), 1e-12)  # 0 would be no edge
+        weights = np.concatenate((costs, costs))
         return nodes, csr_array((weights, (both[:, 0], both[:, 1])), shape=(len(nodes), len(nodes)))
 
     def _guide(self, nodes: FloatArray, graph: csr_array, spacing: int) -> FloatArray:

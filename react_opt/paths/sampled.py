@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from react_opt.geometry.sight import Padded, point_free_px, segment_free_px
 from react_opt.kernels import kernel
+from react_opt.paths.motion import Field, segment_px
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -182,6 +183,26 @@ def join(
                 count += 1
                 got += 1
     return rows[:count].copy(), cols[:count].copy(), lengths[:count].copy()
+
+
+@kernel
+def leg_times(field: Field, nodes: FloatArray, pairs: IntArray) -> FloatArray:
+    """Return the driving times of straight legs, s.
+
+    Parameters
+    ----------
+    field
+        The map and the robot (:func:`react_opt.paths.motion.terrain`).
+    nodes
+        ``(v, 2)`` pixel coordinates.
+    pairs
+        ``(e, 2)`` nodes that the legs join.
+    """
+    times = np.empty(len(pairs))
+    for k in range(len(pairs)):
+        a, b = pairs[k, 0], pairs[k, 1]
+        times[k] = segment_px(field, nodes[a, 0], nodes[a, 1], nodes[b, 0], nodes[b, 1])
+    return times
 
 
 @kernel

@@ -13,6 +13,7 @@ from test_energy import ROBOT
 from react_opt.errors import MissingPartError, UsageError
 from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
 from react_opt.geometry.occupancy import FREE, OccupancyMap
+from react_opt.paths.exact import exact_costs
 from react_opt.paths.ompl_ import PLANNERS, OmplPathCosts
 from react_opt.paths.protocol import PathCosts
 from react_opt.paths.visibility import VisibilityCosts
@@ -56,6 +57,19 @@ def test_no_pair_is_missing_and_none_is_shorter_than_exact_or_much_longer(space:
     assert np.isnan(found.time_s[~found.reachable]).all()
     assert np.array_equal(found.length_m, found.length_m.T, equal_nan=True)
     assert "PRMstar" in found.method
+
+
+def test_least_time_takes_the_way_that_is_faster_though_longer(space: FreeSpace) -> None:
+    points = free_points(space, 12, 4)
+    short, fast = (
+        OmplPathCosts(space, ROBOT, samples=400, minimise=what).cost_table(points) for what in ("length", "time")
+    )
+    best = exact_costs(space, ROBOT, method="fastest16").cost_table(points)
+    there = short.reachable & (short.length_m > 0)
+    assert np.array_equal(short.reachable, fast.reachable)
+    assert fast.time_s[there].mean() < 0.97 * short.time_s[there].mean()
+    assert fast.length_m[there].mean() > short.length_m[there].mean()
+    assert fast.time_s[there].mean() < 1.08 * best.time_s[there].mean()
 
 
 def test_same_seed_same_table_and_another_seed_another(space: FreeSpace) -> None:
@@ -159,7 +173,14 @@ def test_a_planner_that_does_not_answer_is_killed_and_the_next_query_works(space
 
 
 def test_options_that_make_no_sense_are_refused(space: FreeSpace) -> None:
-    for options in ({"planner": "SORRTstar"}, {"footprint": "point"}, {"samples": 0}, {"seed": -1}, {"iterations": 0}):
+    for options in (
+        {"planner": "SORRTstar"},
+        {"footprint": "point"},
+        {"samples": 0},
+        {"seed": -1},
+        {"iterations": 0},
+        {"minimise": "energy"},
+    ):
         with pytest.raises(UsageError):
             OmplPathCosts(space, ROBOT, **options)
 
