@@ -210,10 +210,13 @@ def serve(handle: int, target: str) -> None:
         try:
             while True:
                 message = connection.recv()
-                if message != "stop":
-                    jobs.put(message)
-                elif current:
+                if message == "stop":
                     current[0].stop("interrupt")
+                    continue
+                program, request, deadline, args = message
+                left = None if deadline is None else perf_counter() + deadline - monotonic()
+                current[:] = [_TellingWatch(program.maximise, left, tell=tell)]
+                jobs.put((program, request, current[0], args))
         except (EOFError, OSError):
             os._exit(0)
 
@@ -221,12 +224,8 @@ def serve(handle: int, target: str) -> None:
     run = getattr(import_module(module), name)
     threading.Thread(target=listen, daemon=True).start()
     while True:
-        program, request, deadline, args = jobs.get()
-        left = None if deadline is None else perf_counter() + deadline - monotonic()
-        watch = _TellingWatch(program.maximise, left, tell=tell)
-        current[:] = [watch]
+        program, request, watch, args = jobs.get()
         tell(_answer(run, program, request, watch, args))
-        current.clear()
 
 
 def _answer(run: Any, program: Program, request: Request, watch: Watch, args: tuple[str, ...]) -> tuple[str, Any]:

@@ -168,7 +168,7 @@ def refuse(program: Program, request: Request, watch: Watch) -> Claim:
 def obey(program: Program, request: Request, watch: Watch, *args: str) -> Claim:
     stopped = threading.Event()
     watch.on_stop = stopped.set
-    if not args:
+    if not args and not watch.stopped():
         stopped.wait(30.0)
     return Claim("no_solution", bound=21.0, notes=[str(os.getpid())])
 
