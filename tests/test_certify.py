@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import types
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +14,7 @@ from strategies import MIDDLE, TINY, Size, random_oros, random_plan, seeds
 
 from react_opt.certify import check
 from react_opt.certify_base import Violation
-from react_opt.errors import UsageError
+from react_opt.errors import InputError, UsageError
 from react_opt.instance import Fleet, OrosInstance
 from react_opt.jsonio import parse, sha256
 from react_opt.plan import OrosPlan
@@ -285,3 +287,49 @@ def test_an_instance_without_robots_has_an_empty_plan() -> None:
 
 def test_violations_print_without_a_step_or_an_amount() -> None:
     assert str(Violation("claim", "", None, None, "no bound")) == "claim: no bound"
+
+
+# --- the bound recomputed from the claim's certificate ---
+
+
+def bound_case(certificate: Data | None, bound: float | None = 31.0) -> tuple[Any, Any]:
+    data = plan_data()
+    instance = parse(instance_data())
+    data["instance"]["sha256"] = sha256(instance)
+    data["claim"] |= {
+        "bound": bound,
+        "certificate": certificate,
+        "gap": None if bound is None else (bound - 30.9) / 30.9,
+    }
+    return instance, parse(data)
+
+
+@pytest.mark.parametrize(("proven", "rules"), [(30.95, set()), (31.0, set()), (31.0 + 1e-9, set()), (31.1, {"bound"})])
+def test_the_recomputed_bound_may_not_be_above_the_claimed_one(
+    proven: float, rules: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = types.ModuleType("react_opt.certify_bound")
+    part.recompute_bound = lambda instance, certificate: certificate["value"]  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "react_opt.certify_bound", part)
+    found = check(*bound_case({"value": proven}), bound=True)
+    assert {violation.rule for violation in found.violations} == rules
+    assert found.bound == proven
+
+
+def test_a_certificate_that_makes_no_sense_is_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(instance: Any, certificate: Any) -> float:
+        raise InputError.single("<data>", "claim.certificate.prices", "required, but missing")
+
+    part = types.ModuleType("react_opt.certify_bound")
+    part.recompute_bound = refuse  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "react_opt.certify_bound", part)
+    (found,) = check(*bound_case({}), bound=True).violations
+    assert found.rule == "bound"
+    assert "claim.certificate.prices" in found.message
+
+
+def test_a_bound_without_a_certificate_cannot_be_recomputed() -> None:
+    (found,) = check(*bound_case(None), bound=True).violations
+    assert (found.rule, found.amount) == ("bound", None)
+    assert check(*bound_case(None)).ok
+    assert check(*bound_case(None, bound=None), bound=True).ok
