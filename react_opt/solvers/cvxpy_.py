@@ -65,6 +65,11 @@ def _glpk(request: Request, left_s: float | None) -> dict[str, Any]:
     return {"mip_gap": request.gap_rel} | ({} if left_s is None else {"tm_lim": max(1, int(1000 * left_s))})
 
 
+def _cbc(request: Request, left_s: float | None) -> dict[str, Any]:
+    options = {"allowableGap": request.gap_abs, "allowableFractionGap": request.gap_rel}
+    return options | ({} if left_s is None else {"maximumSeconds": left_s})
+
+
 def _gurobi(request: Request, left_s: float | None) -> dict[str, Any]:
     options = {
         "MIPGap": request.gap_rel,
@@ -82,6 +87,7 @@ _OPTIONS: dict[str, Callable[[Request, float | None], dict[str, Any]]] = {
     "SCIP": _scip,
     "SCIPY": _scipy,
     "GLPK_MI": _glpk,
+    "CBC": _cbc,
     "GUROBI": _gurobi,
 }
 """How limits and gaps are told to the solvers for which that has been tried."""
