@@ -39,6 +39,8 @@ class SubsetRow:
 
     def coefficient(self, column: Column) -> float:
         """Return how often the column's route collects two of the cells without forgetting in between."""
+        if sum(cell in self.cells for cell in column.cells) < 2:
+            return 0.0
         route = column.path
         odd, times = False, 0
         for cell, senses in zip(route.cell.tolist(), route.sense.tolist(), strict=True):

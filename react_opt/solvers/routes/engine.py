@@ -20,7 +20,6 @@ from react_opt.solvers.routes.greedy import greedy
 from react_opt.solvers.routes.master import Master
 from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pricing import RoutePricer, route_column
-from react_opt.solvers.routes.replay import tidy
 from react_opt.solvers.routes.rows import violated_limits
 from react_opt.solvers.routes.search import improve
 from react_opt.solvers.routes.selection import select
@@ -29,10 +28,9 @@ FIRST_MEMORY = 8
 MOST_CUTS = 64
 EASY_ROUTES = 3_000
 MOST_ROUTES = 30_000
-PRIMAL_SHARE = 0.3
+PRIMAL_SHARE = 0.05
 FIRST_SEARCH_S = 0.004  # per cell
 FIRST_SEARCH_WORK = 20
-CHOICE = 500
 Status = Literal["optimal", "feasible", "infeasible", "no_plan", "not_priced"]
 
 
@@ -153,6 +151,7 @@ class _Proof:
         )
         self.proof: dict[str, Any] = {}
         self._searches = 0
+        self._hopeless_gap = np.inf
 
     def run(self) -> None:
         """Go on until the plan is proven or a limit is reached."""
@@ -164,6 +163,7 @@ class _Proof:
             self._improve_until(time.perf_counter() + wait_s, FIRST_SEARCH_WORK)
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
         while not self.standing.done():
+            self._forget_columns()
             solved = self.generation.converge(at_root=True)
             self._keep_certificate()
             if self.standing.done():
@@ -202,6 +202,15 @@ class _Proof:
         if best is not None and (not self.proof or best.bound < self.proof["bound"]):
             self.proof = certificate(self.problem, self.memory, best, self.master.cuts, self.master.rows)
 
+    def _forget_columns(self) -> None:
+        """Drop columns that no better plan can contain: their reduced value is below incumbent minus bound."""
+        best, objective = self.generation.best, self.standing.objective
+        if best is None or objective is None or self.standing.bound is None or len(self.master.columns) < 500:
+            return
+        reduced = dict(zip(map(id, self.master.columns), self.master.reduced_values(self.generation.extended(best.duals)), strict=True))
+        floor = objective - best.bound - 1e-6 * max(1.0, abs(objective))
+        self.master.drop(lambda column: reduced[id(column)] < floor)
+
     def _add_limits(self) -> bool:
         """Add limits between robots that the linear programme breaks."""
         point = self.generation.point
@@ -228,7 +237,7 @@ class _Proof:
         return True
 
     def _improve(self) -> None:
-        """Look for better plans: whole columns of the master, then a short primal search."""
+        """Look for better plans: the linear programme's own, if it is whole, then a short primal search."""
         point = self.generation.point
         if point is not None and np.all((point.use < 1e-6) | (np.abs(point.use - np.round(point.use)) < 1e-6)):
             whole = [
@@ -240,36 +249,7 @@ class _Proof:
                 self.standing.offer(sorted(whole, key=lambda route: route.robot_class))
                 if self.standing.done():
                     return
-        standing = self.standing
-        left = standing.budget.left_s()
-        chosen = select(
-            self._simple_columns(),
-            self.problem.n_cells,
-            self.counts,
-            gap=0.1 * (standing.slack or 0.0),
-            floor=None,
-            time_limit_s=1.0 if left is None else min(1.0, 0.2 * left),
-            node_limit=200,
-            seed=self.seed,
-        )
-        standing.budget.spend()
-        if chosen.columns is not None:
-            standing.offer([column.path for column in chosen.columns])
-        if standing.routes is None or standing.done():
-            return
         self._search(PRIMAL_SHARE)
-
-    def _simple_columns(self) -> list[Column]:
-        """Return the master's best columns, second collections of a cell left out."""
-        point = self.generation.point
-        columns = self.master.columns
-        if point is not None:
-            reduced = self.master.reduced_values(point.duals)
-            columns = [columns[k] for k in np.argsort(-reduced, kind="stable")[:CHOICE]]
-        return [
-            column if column.elementary else route_column(self.problem, tidy(self.problem, [column.path])[0])
-            for column in columns
-        ]
 
     def _finish_by_enumeration(self, most: int) -> bool:
         """Enumerate all routes that a better plan can contain and choose among them; return whether it was done."""
@@ -279,6 +259,9 @@ class _Proof:
         if any(row for row in self.master.rows):
             return False
         gap = best.bound - standing.objective + 1e-7 * max(1.0, abs(best.bound))
+        if gap > self._hopeless_gap:
+            return False
+        self._hopeless_gap = 0.7 * gap
         columns: list[Column] = []
         for group in range(len(self.counts)):
             found = enumerate_routes(
@@ -291,7 +274,7 @@ class _Proof:
                 max_routes=most,
             )
             standing.budget.spend()
-            if found is None:
+            if found is None or len(columns) + len(found) > most:
                 return False
             columns += found
         chosen = select(

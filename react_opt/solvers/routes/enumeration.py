@@ -246,7 +246,7 @@ def enumerate_routes(
     side: SidePrices = NO_SIDE_PRICES,
     cuts: Sequence[SubsetRow] = (),
     *,
-    max_labels: int = 2_000_000,
+    max_labels: int = 500_000,
     max_routes: int = 50_000,
 ) -> list[Column] | None:
     """Return the best route for every set of cells whose value minus prices reaches ``floor``.
@@ -266,7 +266,7 @@ def enumerate_routes(
     max_labels, max_routes
         Limits beyond which the enumeration is given up.
     """
-    ahead, bound, behind, cutoff = pricer.completions(group, duals, floor, side, cuts, max_labels)
+    ahead, bound, behind, cutoff = pricer.completions(group, duals, floor, side, cuts)
     if behind is None:
         return None
     data, n = pricer.problem.classes[group], pricer.problem.n_cells

@@ -75,8 +75,8 @@ class Generation:
         enough
             Bound that suffices.
         """
+        centre = None if self.best is None else self.extended(self.best.duals)
         self.best = None
-        centre: Duals | None = None
         smoothing = SMOOTHING
         while not self.standing.budget.over():
             point = self.master.solve(self.standing.budget.left_s())
@@ -122,6 +122,18 @@ class Generation:
         total = float(duals.cell.sum()) + float(self.counts @ best)
         total += sum(price * cut.rhs for price, cut in zip(duals.cut, self.master.cuts, strict=True))
         return total + sum(price * row.rhs for price, row in zip(duals.row, self.master.rows, strict=True))
+
+    def extended(self, duals: Duals) -> Duals:
+        """Return multipliers with zeros for cuts and rows that came later.
+
+        Parameters
+        ----------
+        duals
+            Multipliers of an earlier master.
+        """
+        cut, row = np.zeros(len(self.master.cuts)), np.zeros(len(self.master.rows))
+        cut[: len(duals.cut)], row[: len(duals.row)] = duals.cut, duals.row
+        return replace(duals, cut=cut, row=row)
 
     def _settled(self, bound: float, enough: float | None) -> bool:
         bound = self.standing.lattice.round_down(bound)

@@ -25,6 +25,7 @@ from react_opt.solvers.routes.memory import Memory
 
 MAX_LABELS = 20_000_000
 COARSE_SIZE = 8
+BACKWARD_LABELS = 100_000
 
 
 @dataclass(frozen=True)
@@ -218,9 +219,10 @@ class RoutePricer:
         floor: float,
         side: SidePrices,
         cuts: Sequence[SubsetRow],
-        max_labels: int,
     ) -> tuple[Prices, FloatArray, Labels | None, float]:
         """Return what bounds every single label of a class: prices, flat bound, labels from the horizon, cutoff.
+
+        The labels are None if there are too many.
 
         Parameters
         ----------
@@ -228,8 +230,6 @@ class RoutePricer:
             The class and its prices.
         floor
             Least value minus prices of interest, the group's multiplier not deducted.
-        max_labels
-            Labels beyond which the labels from the horizon are None.
         """
         ahead, back = self.prices(group, duals, side, cuts)
         cutoff = floor - self._constant(group)
@@ -239,20 +239,24 @@ class RoutePricer:
         ].copy()
         if len(back.stand) > 1:
             past = np.where(past > NEVER, past + back.stand, past)
-        labels, complete = grow_labels(
-            self.backward,
-            back,
-            self._fuel[group][1],
-            self._finish[group],
-            0,
-            past,
-            self._no_labels,
-            cutoff,
-            MAX_LABELS,
-            max_labels,
-            False,
-        )
-        return ahead, bound, labels if complete else None, cutoff
+        for prices in (back, back._replace(cut_of=np.zeros_like(back.cut_of))):
+            # without the cuts the labels from the horizon are fewer and bound less sharply
+            labels, complete = grow_labels(
+                self.backward,
+                prices,
+                self._fuel[group][1],
+                self._finish[group],
+                0,
+                past,
+                self._no_labels,
+                cutoff,
+                MAX_LABELS,
+                BACKWARD_LABELS,
+                False,
+            )
+            if complete:
+                return ahead, bound, labels, cutoff
+        return ahead, bound, None, cutoff
 
     def fuel(self, group: int) -> Fuel:
         """Return the battery of a class as a resource, forwards in time."""
