@@ -48,6 +48,9 @@ class Drop(NamedTuple):
     place: str
     why: str
 
+    def __str__(self) -> str:
+        return f"dropped {self.what} {self.place}: {self.why}"
+
 
 @dataclass(frozen=True)
 class BuildReport:

@@ -15,7 +15,10 @@ from react_opt.energy import RobotProfile
 from react_opt.geometry.inflation import FreeSpace
 from react_opt.geometry.occupancy import FloatArray
 from react_opt.paths.exact import exact_costs
-from react_opt.paths.protocol import CostTable, PathCosts
+from react_opt.paths.protocol import PathCosts
+
+Planners = list[list[PathCosts]]
+"""For each profile the ways to plan a drive."""
 
 PathKind = Literal["exact", "ompl"]
 Area = tuple[int, int]
@@ -96,8 +99,8 @@ class Passages:
                 if other in self.standing:
                     yield (a, b), other
 
-    def _planners(self, space: FreeSpace) -> list[list[PathCosts]]:
-        """Return for each profile the ways to plan a drive."""
+    def _planners(self, space: FreeSpace) -> Planners:
+        """Return the planners of a map."""
         if self.kind == "exact":
             return [[exact_costs(space, each), exact_costs(space, each, method="fastest16")] for each in self.profiles]
         from react_opt.paths.ompl_ import OmplPathCosts
@@ -110,41 +113,48 @@ class Passages:
         ]
 
     @cached_property
-    def _whole(self) -> list[list[PathCosts]]:
+    def _whole(self) -> Planners:
         """The planners of the whole map, for what a window of two areas cannot answer."""
         return self._planners(self.grid.space)
 
-    def _both_ways(self, planners: list[list[PathCosts]], one: Area, other: Area) -> Iterator[tuple[Area, Area, Mode]]:
-        ends = [self.standing[one], self.standing[other]]
-        starts = [*self.poses.get(one, []), *self.poses.get(other, [])]
-        first = len(self.poses.get(one, []))
-        points = np.array([*ends, *starts])
-        tables = [[each.cost_table(points) for each in own] for own in planners]
-        if not all(table.reachable.all() for own in tables for table in own):
-            tables = [[each.cost_table(points) for each in own] for own in self._whole]
-        at_one, at_other = [0, *range(2, 2 + first)], [1, *range(2 + first, len(points))]
-        yield from ((one, other, mode) for mode in self._modes(tables, at_one, 1))
-        yield from ((other, one, mode) for mode in self._modes(tables, at_other, 0))
+    def _both_ways(self, planners: Planners, one: Area, other: Area) -> Iterator[tuple[Area, Area, Mode]]:
+        starts = [self.poses.get(one, []), self.poses.get(other, [])]
+        points = np.array([self.standing[one], self.standing[other], *starts[0], *starts[1]])
+        drives = _measured(planners, points)
+        if np.isnan(drives[..., 1]).any():  # a start pose that a wall parts from its area's standing point
+            drives = np.where(np.isnan(drives), _measured(self._whole, points), drives)
+        first = 2 + len(starts[0])
+        yield from ((one, other, mode) for mode in self._modes(drives[..., [0, *range(2, first)], 1]))
+        yield from ((other, one, mode) for mode in self._modes(drives[..., [1, *range(first, len(points))], 0]))
 
-    def _modes(self, tables: list[list[CostTable]], starts: list[int], end: int) -> list[Mode]:
+    def _modes(self, drives: FloatArray) -> list[Mode]:
         """Return the speed modes of one arc that no other beats, fast ones first.
 
         Each way to plan makes one mode: the most steps and the most joules of any profile from any start. The
         energy of standing for the rest of the last step is part of it.
+
+        Parameters
+        ----------
+        drives
+            ``(ways, profiles, 3, starts)``: s, J and m of each drive.
         """
         modes = []
-        for way in range(len(tables[0])):
-            times = np.array([own[way].time_s[starts, end] for own in tables])
-            steps = max(1, ceil(float(times.max()) / self.step_s - _ROUNDING))
-            energies = np.array([own[way].energy_j[starts, end] for own in tables])
-            idle = np.array([[profile.idle_w] for profile in self.profiles])
-            energy = float((energies + idle * (steps * self.step_s - times)).max())
-            slowest = np.unravel_index(np.argmax(times), times.shape)
-            length = float(tables[slowest[0]][way].length_m[starts, end][slowest[1]])
-            modes.append(Mode(steps, energy, length / float(times.max())))
-        waiting_j = min(profile.idle_w for profile in self.profiles) * self.step_s
+        idle_w = np.array([[profile.idle_w] for profile in self.profiles])
+        for time_s, energy_j, length_m in np.moveaxis(drives, 2, 1):
+            steps = max(1, ceil(float(time_s.max()) / self.step_s - _ROUNDING))
+            with_rest_j = energy_j + idle_w * (steps * self.step_s - time_s)
+            slowest = np.unravel_index(np.argmax(time_s), time_s.shape)
+            modes.append(Mode(steps, float(with_rest_j.max()), float(length_m[slowest] / time_s[slowest])))
+        waiting_j = float(idle_w.min()) * self.step_s
         kept: list[Mode] = []
-        for mode in sorted(modes, key=lambda each: (each.steps, each.energy_j)):
+        for mode in sorted(modes):
             if all(mode.energy_j < each.energy_j + waiting_j * (mode.steps - each.steps) - 1e-6 for each in kept):
                 kept.append(mode)
         return kept
+
+
+def _measured(planners: Planners, points: FloatArray) -> FloatArray:
+    """Return s, J and m between points as ``(ways, profiles, 3, n, n)``, NaN where there is no path."""
+    tables = [[way.cost_table(points) for way in own] for own in planners]
+    each = [[(table.time_s, table.energy_j, table.length_m) for table in own] for own in tables]
+    return np.swapaxes(np.array(each), 0, 1)

@@ -2,6 +2,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.cluster.hierarchy import DisjointSet
 
 from react_opt.areas import lay_grid
 from react_opt.build import BuildReport, build
@@ -158,6 +161,16 @@ def test_arcs_that_leave_the_start_cell_are_timed_from_the_worst_start_pose(path
     assert {steps for ((steps, _),) in arcs(near).values()} == {10}  # it may come back and leave from the centre
 
 
+@both
+def test_a_start_pose_behind_a_wall_in_its_area_counts_by_the_way_round(paths: str) -> None:
+    # the pose lies in an alley 2 m wide that opens 14 m east, in the next area: on the way up the robot leaves both
+    source = floor(20, 20, (0, 2, 14, 2.2))
+    report = build(source, fleet((9, 1)), cell_m=10, horizon_s=60, step_s=1, paths=paths)
+    ((up, _),), ((down, _),) = arcs(report)["g0_0", "g0_1"], arcs(report)["g0_1", "g0_0"]
+    assert down == 10
+    assert up >= 5 + np.hypot(9, 13)  # to the wall's end, then to (5, 15)
+
+
 def test_a_robot_that_starts_in_a_wall_is_named_and_so_are_all_others() -> None:
     source = floor(20, 10, (3, 3, 4, 4), (10, 0, 20, 10))
     with pytest.raises(InputError) as caught:
@@ -237,6 +250,40 @@ def test_speed_modes_are_worth_having() -> None:
     (fast, slow) = arcs(report)["g0_0", "g1_0"]
     assert fast[0] < slow[0]
     assert slow[1] < fast[1] + 2.0 * 5 * (slow[0] - fast[0])  # more than waiting would spend
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(
+    st.integers(0, 10_000), st.floats(0.0, 0.3), st.sampled_from([2.0, 3.0, 5.0]), st.sampled_from(["exact", "ompl"])
+)
+def test_on_any_map_cells_hang_together_and_arcs_take_what_they_must(
+    seed: int, share: float, cell_m: float, paths: str
+) -> None:
+    rng = np.random.default_rng(seed)
+    cells = (rng.random((8, 10)) < share).astype(np.uint8)
+    source = OccupancyMap(np.repeat(np.repeat(cells, 4, 0), 4, 1), 0.25, *rng.uniform(-20, 20, 2))  # 10 m x 8 m
+    space = inflate(source, Footprint(0.25))
+    rows, cols = np.nonzero(space.blocked == 0)
+    if not rows.size:
+        return
+    pick = rng.integers(rows.size, size=2)
+    starts = space.to_world(np.stack((cols[pick], rows[pick]), axis=1) + 0.5)
+    report = build(source, fleet(*starts), cell_m=cell_m, horizon_s=100, step_s=3, paths=paths)
+    instance = report.instance
+    place = {cell.id: np.array((cell.x_m, cell.y_m)) for cell in instance.cells}
+    assert space.points_free(np.array(list(place.values()))).all()
+    together = DisjointSet(place)
+    for arc in instance.travel:
+        together.merge(arc.from_, arc.to)
+        (a, b), (c, d) = (tuple(map(int, end[1:].split("_"))) for end in (arc.from_, arc.to))
+        assert abs(a - c) + abs(b - d) == 1
+        metres = np.hypot(*(place[arc.from_] - place[arc.to]))
+        assert arc.steps >= metres / 3 - 1e-6  # 1 m/s, steps of 3 s
+        assert arc.energy_j >= 7 * metres + 2 * 3 * arc.steps - 1e-4
+    assert together.n_subsets == 1
+    assert {(arc.from_, arc.to) for arc in instance.travel} == {(arc.to, arc.from_) for arc in instance.travel}
+    assert {robot.start for robot in instance.robots} <= set(place)
+    assert len(instance.robots) + sum(drop.what == "robot" for drop in report.dropped) == 2
 
 
 def test_grid_lines_are_multiples_where_that_needs_no_more_areas() -> None:
