@@ -17,7 +17,7 @@ from react_opt.solvers.routes.sequences import SequenceModel, applies, decode, e
 
 _DEFAULT_WORK = 100
 _MOST_CELLS = 6000  # above this the square table of fastest ways is not built
-_HOT, _COLD = 0.2, 0.01  # temperatures as shares of what a cell earns at best, on average
+_HOT, _COLD = 0.2, 0.02  # temperatures as shares of what a cell earns at best, on average
 _FIRST_CYCLE = 4  # annealing chunks of the first cycle; every cycle is four times as long as the one before
 _WIDTHS = (64, 256, 1024)
 _EXPANSIONS = 400_000  # labels times arcs that one best response may look at, some tenths of a second
@@ -163,8 +163,8 @@ def _hindered(problem: RouteProblem) -> bool:
 def _anneal(search: _Search, model: SequenceModel, cycle: int) -> None:
     """One cycle of annealing from the best plan, hot first and milder in later cycles."""
     problem = search.problem
-    ruin_share = min(0.08, max(0.003, 3.0 / problem.n_cells))  # one costs as much as many segment moves
-    moves = min(10_000, int(150.0 / ruin_share))
+    ruin_share = min(0.06, max(0.001, 1.5 / problem.n_cells))  # one costs as much as many segment moves
+    moves = min(10_000, int(100.0 / ruin_share))
     order, lengths = encode(problem, search.routes)
     best_order, best_lengths = order.copy(), lengths.copy()
     reward = np.maximum(problem.reward, 0.0)
