@@ -27,6 +27,7 @@ from react_opt.solvers.routes.labels import (
     Labels,
     MaskArray,
     Prices,
+    at_most,
     completed,
     lowest_bit,
 )
@@ -89,7 +90,7 @@ def grow_sets(
         for j in range(n):
             node = tau * n + j
             start[node] = count
-            if not complete or tau < start_time or completion[tau, j] <= NEVER:
+            if not complete or tau < start_time or completion[0, tau, j] <= NEVER:
                 continue
             mirrored = (last - tau) * n + j
             gain = prices.gain[tau, j]
@@ -137,13 +138,22 @@ def grow_sets(
                             s ^= cut_of
                             f += fuel.sense
                         # a label before collecting is completed with collecting here, one after it without
-                        if v - p + completion[tau, j] - (max(gain, 0.0) if collects else 0.0) < cutoff:
+                        here = max(gain, 0.0) if collects else 0.0
+                        if v - p + completion[0, tau, j] - here < cutoff:
                             break
-                        if limited and f + least > fuel.budget:
+                        if limited and (
+                            f + least > fuel.budget
+                            or (not collects and at_most(v - p, f, fuel, completion, tau, j) < cutoff)
+                        ):
                             break
-                        if joined and collects == 0:
-                            if not completed(v - p, m, s, f, mirrored, other, prices.cut_price, fuel.budget, cutoff):
-                                break
+                        if (
+                            joined
+                            and collects == 0
+                            and not completed(
+                                v - p, m, s, f, mirrored, other, prices.cut_price, fuel.budget, cutoff
+                            )
+                        ):
+                            break
                         if found == room:
                             room *= 2
                             c_value = np.concatenate((c_value, np.empty(found)))
@@ -266,14 +276,14 @@ def enumerate_routes(
     max_labels, max_routes
         Limits beyond which the enumeration is given up.
     """
-    ahead, bound, behind, cutoff = pricer.completions(group, duals, floor, side, cuts)
+    ahead, fuel, bound, behind, cutoff = pricer.completions(group, duals, floor, side, cuts)
     if behind is None:
         return None
     data, n = pricer.problem.classes[group], pricer.problem.n_cells
     labels, sets, complete = grow_sets(
         pricer.forward,
         ahead,
-        pricer.fuel(group),
+        fuel,
         data.start,
         data.start_step,
         bound,

@@ -86,7 +86,8 @@ class Prices(NamedTuple):
 class Fuel(NamedTuple):
     """The battery as a resource of the labels, J; ``budget`` infinite where it cannot bind.
 
-    ``least`` is ``(H + 1, n)``: the least energy with which a route is completed from here, J.
+    ``least`` is ``(H + 1, n)``: the least energy with which a route is completed from here, J. ``rate`` are the
+    prices of a joule, first 0, at which the rest of a route has been bounded.
     """
 
     budget: float
@@ -94,6 +95,7 @@ class Fuel(NamedTuple):
     wait: float
     sense: float
     least: FloatArray
+    rate: FloatArray
 
 
 class Labels(NamedTuple):
@@ -201,6 +203,15 @@ def completed(
     return False
 
 
+@kernel(inline="always")
+def at_most(value: float, burnt: float, fuel: Fuel, completion: FloatArray, tau: int, cell: int) -> float:
+    """Return what a label can end at, by Lagrangian relaxation of the battery."""
+    best = np.inf
+    for k in range(len(fuel.rate)):
+        best = min(best, value + completion[k, tau, cell] + fuel.rate[k] * (fuel.budget - burnt))
+    return best
+
+
 @kernel(nogil=True)
 def grow_labels(
     graph: Graph,
@@ -224,7 +235,8 @@ def grow_labels(
     origin, origin_time
         Value of starting in each cell (``NEVER`` where no route starts), at this instant.
     completion
-        ``(H + 1, n)`` bound on what the rest of the route earns from here, collecting here included.
+        ``(n_rates, H + 1, n)`` bound on what the rest of the route earns from here, collecting here included,
+        when each joule of it costs ``fuel.rate``.
     other
         Labels of the other direction, in its own kernel time (``H - tau``), for a sharper bound; of length 0
         if there are none. They have to stem from the same or weaker memory and at least the same gains.
@@ -267,7 +279,7 @@ def grow_labels(
         for j in range(n):
             node = tau * n + j
             start[node] = count
-            if tau < origin_time or completion[tau, j] <= NEVER:
+            if tau < origin_time or completion[0, tau, j] <= NEVER:
                 continue
             mirrored = (last - tau) * n + j
             stand = prices.stand[tau, j] if priced else 0.0
@@ -302,11 +314,13 @@ def grow_labels(
                     else:
                         v, m, s = value[k] - cost - stand, memory[k] & keep, cuts[k] & cut_keep
                         f = burnt[k] + burn
-                    if v + completion[tau, j] < cutoff:
+                    if v + completion[0, tau, j] < cutoff:
                         if taken == ORIGIN:
                             continue
                         break  # labels are sorted by value
-                    if limited and f + least > fuel.budget:
+                    if limited and (
+                        f + least > fuel.budget or at_most(v, f, fuel, completion, tau, j) < cutoff
+                    ):
                         continue
                     if joined and not completed(
                         v + stand, m, s, f, mirrored, other, prices.cut_price, fuel.budget, cutoff

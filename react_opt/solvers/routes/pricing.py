@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +75,7 @@ class RoutePricer:
         self.remember()
         self._origin = []
         self._finish = []
+        self._rate = [0.0] * len(problem.classes)
         self._fuel: list[tuple[Fuel, Fuel]] = []
         no_gain = np.zeros((horizon + 1, n))
         for group in problem.classes:
@@ -97,8 +98,8 @@ class RoutePricer:
             behind = -flat_values(self.backward, costs, finish, 0, False)
             self._fuel.append(
                 (
-                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, behind[::-1].copy()),
-                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, ahead[::-1].copy()),
+                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, behind[::-1].copy(), np.zeros(1)),
+                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, ahead[::-1].copy(), np.zeros(1)),
                 )
             )
 
@@ -190,12 +191,12 @@ class RoutePricer:
         for group in range(len(self.problem.classes)) if groups is None else groups:
             ahead, back = self.prices(group, duals, side, cuts)
             data = self.problem.classes[group]
-            bound = self._rest(group, ahead, back)
+            fuel, bound = self._rest(group, back, onwards=True)
             cutoff = float(floor[group]) - self._constant(group)
             labels, complete = grow_labels(
                 self.forward,
                 ahead,
-                self._fuel[group][0],
+                fuel,
                 self._origin[group],
                 data.start_step,
                 bound,
@@ -219,8 +220,10 @@ class RoutePricer:
         floor: float,
         side: SidePrices,
         cuts: Sequence[SubsetRow],
-    ) -> tuple[Prices, FloatArray, Labels | None, float]:
-        """Return what bounds every single label of a class: prices, flat bound, labels from the horizon, cutoff.
+    ) -> tuple[Prices, Fuel, FloatArray, Labels | None, float]:
+        """Return what bounds every single label of a class.
+
+        Prices, battery, flat bound, labels from the horizon and cutoff.
 
         The labels are None if there are too many.
 
@@ -233,18 +236,14 @@ class RoutePricer:
         """
         ahead, back = self.prices(group, duals, side, cuts)
         cutoff = floor - self._constant(group)
-        bound = self._rest(group, ahead, back)
-        past = flat_values(self.forward, ahead, self._origin[group], self.problem.classes[group].start_step, True)[
-            ::-1
-        ].copy()
-        if len(back.stand) > 1:
-            past = np.where(past > NEVER, past + back.stand, past)
+        fuel, bound = self._rest(group, back, onwards=True)
+        spent, past = self._rest(group, ahead, onwards=False)
         for prices in (back, back._replace(cut_of=np.zeros_like(back.cut_of))):
             # without the cuts the labels from the horizon are fewer and bound less sharply
             labels, complete = grow_labels(
                 self.backward,
                 prices,
-                self._fuel[group][1],
+                spent,
                 self._finish[group],
                 0,
                 past,
@@ -255,19 +254,47 @@ class RoutePricer:
                 False,
             )
             if complete:
-                return ahead, bound, labels, cutoff
-        return ahead, bound, None, cutoff
+                return ahead, fuel, bound, labels, cutoff
+        return ahead, fuel, bound, None, cutoff
 
-    def fuel(self, group: int) -> Fuel:
-        """Return the battery of a class as a resource, forwards in time."""
-        return self._fuel[group][0]
+    def _rest(self, group: int, prices: Prices, *, onwards: bool) -> tuple[Fuel, FloatArray]:
+        """Return the battery with the prices of a joule, and the bound on the rest of a route at each of them.
 
-    def _rest(self, group: int, ahead: Prices, back: Prices) -> FloatArray:
-        """Return ``(T + 1, n)``: bound on what a route still earns from its arrival in a cell."""
-        bound = flat_values(self.backward, back, self._finish[group], 0, True)[::-1].copy()
-        if len(ahead.stand) > 1:
-            bound = np.where(bound > NEVER, bound + ahead.stand, bound)
-        return bound
+        The rest is worth at most ``bound[k, tau, i] + rate[k] * (battery left)``. ``prices`` are those of the
+        direction in which the rest is walked: backwards in time for labels that grow ``onwards``.
+        """
+        data = self.problem.classes[group]
+        fuel = self._fuel[group][0 if onwards else 1]
+        graph = self.backward if onwards else self.forward
+        origin, begin = (self._finish[group], 0) if onwards else (self._origin[group], data.start_step)
+
+        def at_rate(rate: float) -> FloatArray:
+            dearer = prices
+            if rate > 0.0:
+                dearer = prices._replace(
+                    gain=prices.gain - rate * data.sense_j,
+                    arc_cost=prices.arc_cost + rate * fuel.arc,
+                    wait_cost=prices.wait_cost + rate * data.wait_j,
+                )
+            bound = flat_values(graph, dearer, origin, begin, True)[::-1]
+            if len(prices.stand) > 1:
+                bound = np.where(bound > NEVER, bound + prices.stand[::-1], bound)
+            return np.ascontiguousarray(bound)
+
+        if not np.isfinite(fuel.budget):
+            return fuel, at_rate(0.0)[None]
+        here = (data.start_step, data.start) if onwards else None
+
+        def worth(rate: float) -> float:
+            bound = at_rate(rate)
+            top = bound[here] if here is not None else bound[0][origin_end].max(initial=NEVER)
+            return float(top) + rate * fuel.budget
+
+        origin_end = np.flatnonzero(self._finish[group] > NEVER)
+        best = _lowest_point(worth, self._rate[group], float(prices.gain.max(initial=0.0)) / max(data.sense_j, 1.0))
+        self._rate[group] = best
+        rates = np.array([0.0, 0.4 * best, 0.75 * best, best, 1.3 * best, 2.0 * best]) if best > 0 else np.zeros(1)
+        return fuel._replace(rate=rates), np.stack([at_rate(float(rate)) for rate in rates])
 
     def column(self, group: int, labels: Labels, label: int, cell: int) -> Column:
         """Return the route of a label that stands in ``cell`` at the horizon."""
@@ -338,6 +365,27 @@ class RoutePricer:
             cut_keep,
             price,
         )
+
+
+def _lowest_point(function: Callable[[float], float], guess: float, top: float) -> float:
+    """Return roughly where a convex function of a number between 0 and ``top`` is least.
+
+    Around a guess that is already good few evaluations suffice.
+    """
+    low, high = 0.0, top
+    if guess > 0.0:
+        low, high = 0.7 * guess, 1.4 * guess
+        at_low, at_guess, at_high = function(low), function(guess), function(high)
+        if at_low >= at_guess <= at_high:
+            return guess
+        low, high = (guess, top) if at_high < at_guess else (0.0, guess)
+    for _ in range(12):
+        left, right = low + 0.4 * (high - low), low + 0.6 * (high - low)
+        if function(left) <= function(right):
+            high = right
+        else:
+            low = left
+    return 0.5 * (low + high)
 
 
 def route_column(problem: RouteProblem, route: Route) -> Column:
