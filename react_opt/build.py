@@ -265,7 +265,8 @@ def _chargers(
     reach_m = 2 * grid.space.footprint.radius_m
     for index, charger in enumerate(fleet.chargers):
         point = np.array((charger.x_m, charger.y_m))
-        near = grid.space.nearest_free_point(point, region)
+        with np.errstate(over="ignore"):  # a charger may be far off any map
+            near = grid.space.nearest_free_point(point, region)
         if near is None or np.hypot(*(near - point)) > reach_m:
             dropped.append(Drop("charger", f"chargers[{index}]", f"no robot gets to within {reach_m:.2f} m of it"))
             continue

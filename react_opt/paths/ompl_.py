@@ -313,14 +313,15 @@ class OmplPathCosts:
         drive = space.padded if footprint == "disc" else _straight(space, profile)
         self._grids = Grids(space.padded, drive)
         self._timed = minimise == "time"
+        self._child: SearchProcess | None = None
         if planner == "PRMstar":
             planned = RoadmapPlanner(self._grids, seed)
             self._raw = Roadmap(self._grids, planned.grow, self._weigh, samples, seed).paths
             work = f"{samples} samples"
         else:
             count = _ITERATIONS[planner] if iterations is None else iterations
-            child = SearchProcess(self._grids, planner, count, seed, patience_s)
-            self._raw = partial(_searched_paths, child, self._grids)
+            self._child = SearchProcess(self._grids, planner, count, seed, patience_s)
+            self._raw = partial(_searched_paths, self._child, self._grids)
             work = f"{count} iterations"
         self.method = f"OMPL {planner}, {work}, least {minimise}, seed {seed}, {footprint}, refine {space.refine}"
 
@@ -335,7 +336,9 @@ class OmplPathCosts:
             length, time, _, turned = self._measured(path)
             measures[:, i, j] = measures[:, j, i] = length, time, turned
         time_s, energy_j = totals(self.profile, *measures)
-        return CostTable(points, ~np.isnan(measures[0]), measures[0], time_s, energy_j, self.method)
+        killed = self._child.killed if self._child else 0
+        method = f"{self.method}, {killed} queries killed" if killed else self.method
+        return CostTable(points, ~np.isnan(measures[0]), measures[0], time_s, energy_j, method)
 
     def path(self, start_m: ArrayLike, goal_m: ArrayLike) -> Path | None:
         """Return a path between two points, m, tested against the footprint; None where none was found."""

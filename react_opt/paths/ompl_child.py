@@ -16,6 +16,7 @@ import subprocess
 import sys
 import time
 import weakref
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,6 +41,11 @@ class SearchProcess:
         See :func:`react_opt.paths.ompl_.search`; each query's seed also depends on its two ends alone.
     patience_s
         How long a query may take before the child is killed.
+
+    Attributes
+    ----------
+    killed
+        How many queries ended with the child's death.
     """
 
     def __init__(self, grids: Grids, planner: str, iterations: int, seed: int, patience_s: float) -> None:
@@ -52,7 +58,8 @@ class SearchProcess:
         """Return a path between two points in pixel coordinates, None where none was found in time."""
         process = self._process or self._start()
         assert process.stdin is not None
-        _send(process.stdin, (start_px, goal_px))
+        with contextlib.suppress(BrokenPipeError):  # a child that died is one that does not answer
+            _send(process.stdin, (start_px, goal_px))
         done, path = _receive(process.stdout, time.monotonic() + self._patience_s)
         if not done:
             self.killed += 1
@@ -61,8 +68,12 @@ class SearchProcess:
         return path if done else None
 
     def _start(self) -> subprocess.Popen[bytes]:
+        here = str(Path(__file__).resolve().parents[2])  # for a package that is on the path but not installed
         process = subprocess.Popen(
-            [sys.executable, "-m", "react_opt.paths.ompl_child"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [sys.executable, "-m", "react_opt.paths.ompl_child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))},
         )
         weakref.finalize(self, _end, process)
         assert process.stdin is not None

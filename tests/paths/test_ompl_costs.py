@@ -168,7 +168,9 @@ def test_single_query_planners_answer_from_a_child_process(space: FreeSpace, pla
 def test_a_planner_that_does_not_answer_is_killed_and_the_next_query_works(space: FreeSpace) -> None:
     points = np.array([(1.0, 1.0), (11.0, 7.0)])
     costs = OmplPathCosts(space, ROBOT, planner="RRTstar", iterations=10**12, patience_s=0.5)
-    assert not costs.cost_table(points).reachable[0, 1]
+    table = costs.cost_table(points)
+    assert not table.reachable[0, 1]
+    assert "1 queries killed" in table.method
     assert costs.cost_table(points[:1]).reachable.all()
 
 
