@@ -17,10 +17,11 @@ from fractions import Fraction
 import numpy as np
 
 from react_opt.models.inspection import FloatArray, InspectionArrays, Routes
+from react_opt.solvers.inspection.closing import Closing
 from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
 from react_opt.solvers.inspection.local import Searcher
-from react_opt.solvers.inspection.master import Column, Duals, Master, choose
+from react_opt.solvers.inspection.master import Column, Duals, Master
 from react_opt.solvers.inspection.pricing import Pricer, classes_of
 
 VALUE_TOLERANCE = 1e-7  # relative: plans whose values agree within it are worth the same
@@ -30,6 +31,7 @@ MOST_COLUMNS = 40_000  # of the integer program over enumerated routes
 FIRST_PORTION = 400
 PORTION = 2000
 LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing limits the search
+COLUMNS = 30  # added per pricing
 MIP_NODES = 2000  # of an integer program under a work limit
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
 
@@ -261,7 +263,7 @@ class Decomposition:
             return True
         if duals is None:
             return False
-        self._search(PORTION)
+        self._search(min(PORTION, 50 * len(self.arrays.value)))
         return done() or self._enumerate(duals, second) or done()
 
     def _generate(self, second: bool) -> Duals | None:
@@ -278,7 +280,7 @@ class Decomposition:
             prize = duals.value * self.arrays.value + duals.target
             eps = 1e-7 * max(1.0, abs(duals.objective))
             threshold = [-float(price) + eps for price in duals.group]
-            if self._price(prize, rate, threshold, HEURISTIC):
+            if not self.pricers[0].elementary and self._price(prize, rate, threshold, HEURISTIC):
                 if self._thread is not None:
                     self._collect()
                 continue
@@ -300,7 +302,7 @@ class Decomposition:
         added = 0
         for pricer, least in zip(self.pricers, threshold, strict=True):
             self.control.work += 1
-            found = pricer.price(prize, rate, least, mode, HEURISTIC_LABELS, 15, self.control.flag)
+            found = pricer.price(prize, rate, least, mode, HEURISTIC_LABELS, COLUMNS, self.control.flag)
             added += self.master.add(found.columns)
         return added > 0
 
@@ -314,7 +316,7 @@ class Decomposition:
         best, added, whole = [], 0, True
         for pricer, least in zip(self.pricers, threshold, strict=True):
             self.control.work += 1
-            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, 25, self.control.flag)
+            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, COLUMNS, self.control.flag)
             added += self.master.add(found.columns)
             if found.best is None:
                 whole = False
@@ -342,11 +344,8 @@ class Decomposition:
         answer = self.answer
         rate = 1.0 if second else 0.0
         prize = duals.value * self.arrays.value + duals.target
-        if second:
-            gap = answer.cost - (answer.cost_bound or 0.0)
-        else:
-            least = answer.value + max(self.grid, self._value_slack()) if answer.routes is not None else 0.0
-            gap = -duals.objective - least
+        least = answer.value + max(self.grid, self._value_slack()) if answer.routes is not None else 0.0
+        gap = answer.cost - (answer.cost_bound or 0.0) if second else -duals.objective - least
         gap += 1e-6 * max(1.0, abs(duals.objective))
         columns: list[Column] = []
         whole = True
@@ -361,14 +360,16 @@ class Decomposition:
         if not whole or len(columns) > MOST_COLUMNS:
             answer.stuck = answer.stuck or self.control.flag[0] == 0
             columns = [column for column in self.master.columns if len(set(column.stops)) == len(column.stops)]
-        start = None if answer.routes is None else self._columns(answer.routes)
-        known = {(column.group, column.stops) for column in columns}
-        columns += [column for column in dict.fromkeys(start or []) if (column.group, column.stops) not in known]
         left_s = self.control.left_s()
         if not whole and left_s is not None:
             left_s *= 0.3
         nodes = MIP_NODES if self.control.work_limit is not None or (not whole and left_s is None) else None
-        found_mip = choose(self.arrays, self.sizes, columns, self.master.least_value, start, left_s, nodes, self.seed)
+        if second:
+            cutoff = answer.cost - COST_TOLERANCE * max(1.0, answer.cost)
+        else:
+            cutoff = -least + 1e-6 * max(self.grid, self._value_slack())
+        closing = Closing(self.arrays, self.sizes, columns, self.master.least_value, cutoff)
+        found_mip = closing.run(left_s, nodes, self.seed)
         if found_mip.chosen is not None:
             self.offer(self._routes(found_mip.chosen))
         return whole and found_mip.complete

@@ -93,8 +93,8 @@ def _ahead(table: Any, first: Any, other: Any, i: int, used: float, width: float
 @kernel(nogil=True)
 def best_routes(
     prize: Any, rate: float, cost: Any, time_s: Any, energy_j: Any, time_limit: float, energy_limit: float,
-    memory: Any, metric: bool, threshold: float, mode: int, n_time: int, n_energy: int, most: int, stop: Any,
-    node: Any, parent: Any, profit: Any, mask: Any, final: Any,
+    memory: Any, metric: bool, threshold: float, mode: int, n_time: int, n_energy: int, stop: Any, node: Any,
+    parent: Any, profit: Any, mask: Any, final: Any, used_t: Any, used_e: Any, after: Any, dead: Any,
 ) -> int:  # fmt: skip
     """Extend labels until none is left; fill ``node, parent, profit, mask, final`` and return their number.
 
@@ -118,13 +118,14 @@ def best_routes(
         ``HEURISTIC``, ``EXACT`` or ``ENUMERATE``.
     n_time, n_energy
         Buckets of the completion bounds in time and in energy, 0 to do without.
-    most
-        Labels at most; the number returned is negative where they do not suffice.
     stop
         ``(1,)`` set to nonzero by another thread to end early; the number returned is then negative.
     node, parent, profit, mask, final
         Out: per label its target (N: the start), its predecessor, its profit, its excluded targets, and its
-        profit when it goes to the end from here (``-inf`` where it cannot).
+        profit when it goes to the end from here (``-inf`` where it cannot). Their length is the number of
+        labels at most; the number returned is negative where it does not suffice.
+    used_t, used_e, after, dead
+        Room for as many labels: time, energy, the next label at the node, and whether another beats it.
     """
     n = len(prize)
     words = mask.shape[1]
@@ -140,13 +141,12 @@ def best_routes(
     if n_energy > 0:
         e_best, e_first, e_other = completion(prize, gain, energy_j, energy_limit, n_energy)
     t_width, e_width = time_limit / max(1, n_time), energy_limit / max(1, n_energy)
-    used_t, used_e = np.empty(most), np.empty(most)
-    after = np.empty(most, np.int64)
-    dead = np.zeros(most, np.bool_)
+    most = len(node)
     head = np.full(n + 1, -1, np.int64)
     one = np.uint64(1)
     node[0], parent[0], profit[0] = n, -1, 0.0
     used_t[0] = used_e[0] = 0.0
+    dead[0] = False
     for w in range(words):
         mask[0, w] = np.uint64(0)
     for j in range(n):
@@ -230,6 +230,7 @@ def best_routes(
                 used_t[count], used_e[count] = t, e
                 fits = t + time_s[j, n + 1] <= time_limit and e + energy_j[j, n + 1] <= energy_limit
                 final[count] = p + gain[j, n + 1] if fits else -np.inf
+                dead[count] = False
                 after[count] = head[j]
                 head[j] = count
                 count += 1

@@ -91,7 +91,7 @@ class Master:
                 self._known.add(key)
                 new.append(column)
         if new:
-            cost, start, index, value = _matrix(new, self._n, len(self.sizes), self.least_value is not None)
+            cost, start, index, value = matrix_of(new, self._n, len(self.sizes), self.least_value is not None)
             m = len(new)
             self._solver.addCols(m, cost, np.zeros(m), np.full(m, highspy.kHighsInf), len(index), start, index, value)
             self.columns += new
@@ -133,7 +133,7 @@ def quiet() -> highspy.Highs:
     return solver
 
 
-def _matrix(
+def matrix_of(
     columns: list[Column], n: int, groups: int, second: bool
 ) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.int32], FloatArray]:
     """Return costs, and the columns of the matrix by starts, rows and values."""
@@ -149,87 +149,3 @@ def _matrix(
         index += [*seen, n + column.group, n + groups]
         value += [*seen.values(), 1.0, column.value]
     return cost, np.array(start, np.int32), np.array(index, np.int32), np.array(value, np.float64)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What the integer program found: columns chosen (None: nothing), its proven bound (minimised), and whether
-    it ran to its end.
-    """
-
-    chosen: list[Column] | None
-    bound: float
-    complete: bool
-
-
-def choose(
-    arrays: InspectionArrays,
-    sizes: list[int],
-    columns: list[Column],
-    least_value: float | None,
-    start: list[Column] | None,
-    time_limit_s: float | None,
-    node_limit: int | None,
-    seed: int,
-) -> Choice:
-    """Solve the integer program over some columns with HiGHS.
-
-    Parameters
-    ----------
-    arrays, sizes, columns
-        The problem, robots per class, and the columns to choose from.
-    least_value
-        None in stage 1, else the value that stage 2 keeps.
-    start
-        Columns of a feasible choice, all among ``columns``; None for none.
-    time_limit_s, node_limit
-        Limits; None for none.
-    seed
-        Seed of the solver.
-    """
-    n, groups, m = len(arrays.value), len(sizes), len(columns)
-    cost, starts, index, value = _matrix(columns, n, groups, least_value is not None)
-    inf = highspy.kHighsInf
-    solver = quiet()
-    solver.setOptionValue("mip_rel_gap", 1e-9)
-    solver.setOptionValue("mip_abs_gap", 1e-9)
-    solver.setOptionValue("random_seed", seed % (2**31 - 1))
-    if time_limit_s is not None:
-        solver.setOptionValue("time_limit", max(0.0, time_limit_s))
-    if node_limit is not None:
-        solver.setOptionValue("mip_max_nodes", node_limit)
-    lp = highspy.HighsLp()
-    lp.num_col_, lp.num_row_ = m, n + groups + 1
-    lp.col_cost_, lp.col_lower_, lp.col_upper_ = cost, np.zeros(m), np.ones(m)
-    size = np.array(sizes, dtype=np.float64)
-    least = -inf if least_value is None else least_value
-    lp.row_lower_ = np.concatenate([np.full(n, -inf), size, [least]])
-    lp.row_upper_ = np.concatenate([np.ones(n), size, [inf]])
-    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    lp.a_matrix_.start_ = np.append(starts, len(index))
-    lp.a_matrix_.index_, lp.a_matrix_.value_ = index, value
-    # An empty route may be chosen by every robot of its class; every other column visits something, once.
-    lp.col_upper_ = np.array([1.0 if column.stops else float(sizes[column.group]) for column in columns])
-    lp.integrality_ = [highspy.HighsVarType.kInteger] * m
-    solver.passModel(lp)
-    if start is not None:
-        x = np.zeros(m)
-        number = {(column.group, column.stops): at for at, column in enumerate(columns)}
-        for column in start:
-            x[number[column.group, column.stops]] += 1.0
-        solution = highspy.HighsSolution()
-        solution.col_value = x.tolist()
-        solver.setSolution(solution)
-    solver.run()
-    complete = solver.getModelStatus() in (
-        highspy.HighsModelStatus.kOptimal,
-        highspy.HighsModelStatus.kInfeasible,
-    )
-    info = solver.getInfo()
-    if solver.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
-        return Choice(None, np.inf, True)
-    if info.primal_solution_status != 2:
-        return Choice(None, float(info.mip_dual_bound), complete)
-    count = np.round(np.array(solver.getSolution().col_value)).astype(int)
-    chosen = [column for column, times in zip(columns, count.tolist(), strict=True) for _ in range(times)]
-    return Choice(chosen, float(info.mip_dual_bound), complete)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
-from react_opt.models.inspection import FloatArray, InspectionArrays, IntArray
+from react_opt.models.inspection import ABSENT, FloatArray, InspectionArrays, IntArray
 from react_opt.solvers.inspection.labels import EXACT, HEURISTIC, MOST_BUCKETS, best_routes
 from react_opt.solvers.inspection.master import Column
 
 ELEMENTARY_UP_TO = 40  # targets; above, routes remember a neighbourhood
 NEIGHBOURHOOD = 8
 WORTH_NOTHING = 1e-9
+FIRST_LABELS = 4096  # room to begin with
+SLACK = 0.75
 
 
 @kernel
@@ -77,15 +80,24 @@ class Pricer:
         self.n, self.words = n, max(1, (n + 63) // 64)
         self.metric = bool(is_metric(self.time_s, self.energy_j))
         self.elementary = n <= ELEMENTARY_UP_TO
-        self.everything = _bits([range(n)] * n, n, self.words)
+        self.everything = np.tile(_bits([list(range(n))], self.words), (n, 1))
         self.memory = self.everything if self.elementary else self._neighbourhoods()
+        self._room = _labels(FIRST_LABELS, self.words)
+        self._values: list[float] = arrays.value.tolist()
+        buckets = (
+            _bucket_count(self.time_s, arrays.time_limit_s, n),
+            _bucket_count(self.energy_j, self.energy_limit, n),
+        )
+        # A budget that the other one leaves mostly unused bounds nothing: its table is not worth computing.
+        binding = _tightness(self.time_s, arrays.time_limit_s), _tightness(self.energy_j, self.energy_limit)
         self.buckets = (
-            _bucket_count(self.time_s, arrays.time_limit_s, n), _bucket_count(self.energy_j, self.energy_limit, n)
-        )  # fmt: skip
+            0 if binding[0] < SLACK * binding[1] and buckets[1] else buckets[0],
+            0 if binding[1] < SLACK * binding[0] and buckets[0] else buckets[1],
+        )
 
     def _neighbourhoods(self) -> NDArray[np.uint64]:
         near = np.argsort(self.time_s[: self.n, : self.n].T - 1e18 * np.eye(self.n), axis=1, kind="stable")
-        return _bits(near[:, :NEIGHBOURHOOD].tolist(), self.n, self.words)
+        return _bits(near[:, :NEIGHBOURHOOD].tolist(), self.words)
 
     def price(
         self,
@@ -118,22 +130,27 @@ class Pricer:
         if self.metric and mode in (HEURISTIC, EXACT):
             prize = np.where(prize > WORTH_NOTHING, prize, -np.inf)
         memory = self.memory if mode == EXACT else self.everything
-        node, parent = np.empty(most, np.int64), np.empty(most, np.int64)
-        profit, final = np.empty(most), np.empty(most)
-        mask = np.empty((most, self.words), np.uint64)
-        made = best_routes(
-            prize, rate, self.cost, self.time_s, self.energy_j, self.arrays.time_limit_s, self.energy_limit, memory,
-            self.metric, threshold, mode, *self.buckets, most, stop, node, parent, profit, mask, final,
-        )  # fmt: skip
+        while True:
+            room = self._room
+            made = best_routes(
+                prize, rate, self.cost, self.time_s, self.energy_j, self.arrays.time_limit_s, self.energy_limit,
+                memory, self.metric, threshold, mode, *self.buckets, stop, *room,
+            )  # fmt: skip
+            if made >= 0 or stop[0] != 0 or len(room[0]) >= most:
+                break
+            self._room = _labels(min(most, 8 * len(room[0])), self.words)
+        node, parent, _, _, final, used_t, used_e = self._room[:7]
+        used = used_t if self.arrays.by_time else used_e
         size = abs(made)
         good = np.flatnonzero(final[:size] > threshold)
         best = None
         if made > 0 and mode != HEURISTIC:
             best = float(final[good].max()) if len(good) else threshold
         order = good[np.argsort(-final[good], kind="stable")]
+        cost = (used[order] + self.cost[node[order], n + 1]).tolist()
         columns: list[Column] = []
         seen: dict[frozenset[int], int] = {}
-        for label in order.tolist():
+        for label, total in zip(order.tolist(), cost, strict=True):
             if len(columns) >= count:
                 break
             stops: list[int] = []
@@ -142,13 +159,13 @@ class Pricer:
                 stops.append(int(node[at]))
                 at = int(parent[at])
             stops.reverse()
-            column = self.column(tuple(stops))
             key = frozenset(stops) if len(set(stops)) == len(stops) else frozenset([-label])
+            value = sum(self._values[k] for k in stops)
             if key not in seen:
                 seen[key] = len(columns)
-                columns.append(column)
-            elif column.cost < columns[seen[key]].cost:
-                columns[seen[key]] = column
+                columns.append(Column(self.group, tuple(stops), value, total))
+            elif total < columns[seen[key]].cost:
+                columns[seen[key]] = Column(self.group, tuple(stops), value, total)
         return Priced(columns, best, size)
 
     def column(self, stops: tuple[int, ...]) -> Column:
@@ -158,12 +175,22 @@ class Pricer:
         return Column(self.group, stops, value, time_s if self.arrays.by_time else energy_j)
 
 
-def _bits(members: list[range] | list[list[int]], n: int, words: int) -> NDArray[np.uint64]:
-    bits = np.zeros((n, words), np.uint64)
+def _labels(most: int, words: int) -> tuple[NDArray[Any], ...]:
+    """Return room for labels, in the order in which :func:`best_routes` takes it."""
+    whole, real = np.int64, np.float64
+    return (
+        np.empty(most, whole), np.empty(most, whole), np.empty(most, real), np.empty((most, words), np.uint64),
+        np.empty(most, real), np.empty(most, real), np.empty(most, real), np.empty(most, whole),
+        np.empty(most, np.bool_),
+    )  # fmt: skip
+
+
+def _bits(members: list[list[int]], words: int) -> NDArray[np.uint64]:
+    """Return sets of targets as rows of 64-bit words."""
+    flags = np.zeros((len(members), 64 * words), np.uint8)
     for row, those in enumerate(members):
-        for k in those:
-            bits[row, k >> 6] |= np.uint64(1) << np.uint64(k & 63)
-    return bits
+        flags[row, those] = 1
+    return np.packbits(flags, axis=1, bitorder="little").view("<u8").astype(np.uint64)
 
 
 def _bucket_count(resource: FloatArray, limit: float, n: int) -> int:
@@ -173,7 +200,14 @@ def _bucket_count(resource: FloatArray, limit: float, n: int) -> int:
     if least <= 0 or limit <= 0:
         return 0
     count = int(np.ceil(limit / least)) + 1
-    return 0 if count > MOST_BUCKETS else max(count, min(100, 4 * n))
+    return 0 if count > MOST_BUCKETS else max(count, min(60, 4 * n))
+
+
+def _tightness(resource: FloatArray, limit: float) -> float:
+    """Return the mean drive as a share of the budget."""
+    drives = resource[:-2, :-2]
+    drives = drives[drives < ABSENT]
+    return float(drives.mean()) / max(limit, 1e-9) if len(drives) else 0.0
 
 
 def classes_of(arrays: InspectionArrays) -> tuple[list[int], list[int], IntArray]:
