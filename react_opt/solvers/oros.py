@@ -27,6 +27,8 @@ from react_opt.timegraph import route_problem
 MAX_ENTRIES = 150_000_000  # cells x steps of the reward profile: about 5 GB while it is built
 MAX_PLAN_STEPS = 5_000_000  # rows of a plan file
 MAX_COLUMNS = 4_000_000  # of the monolith
+COUPLED_SHARE = 0.3  # of the time, for the decomposition where there are limits between robots
+COUPLED_S, SMALL_COLUMNS = 1.0, 50_000  # at most so long where the monolith is small
 IMPROVE_S, IMPROVE_SHARE, IMPROVE_WORK = 1.0, 0.05, 20  # primal search before the monolith
 
 
@@ -137,12 +139,19 @@ def _greedy(search: Search) -> None:
 
 
 def _proven(search: Search) -> bool:
+    """Whether the gap that was asked for is reached."""
     known = search.best
     if known is None:
         return False
     objective = known[0] + search.constant
-    slack = optimality_tolerance(objective, search.problem.sigma)
-    return search.bound - known[0] <= max(slack, (search.options.gap or 0.0) * abs(objective))
+    return _optimal(search) or search.bound - known[0] <= (search.options.gap or 0.0) * abs(objective)
+
+
+def _optimal(search: Search) -> bool:
+    known = search.best
+    if known is None:
+        return False
+    return search.bound - known[0] <= optimality_tolerance(known[0] + search.constant, search.problem.sigma)
 
 
 def _choose(search: Search) -> Any:
@@ -162,13 +171,37 @@ def _choose(search: Search) -> Any:
         search.method = f"monolith: the solver {options.solver} was asked for"
     elif unpriced_because is not None:
         search.method = f"monolith: {unpriced_because}"
-    else:
+    elif not _coupled(search.problem):
         search.method = "routes"
         return _routes
+    else:
+        search.method = "routes"
+        return _routes_then_monolith
     return _monolith
 
 
-def _routes(search: Search) -> None:
+def _coupled(problem: RouteProblem) -> bool:
+    """Whether there are limits between robots, which the decomposition carries as rows but may not branch on."""
+    limits = (problem.robots_per_cell, problem.sensing_robots_per_step)
+    return problem.forbid_swaps or any(limit is not None for limit in limits)
+
+
+def _routes_then_monolith(search: Search) -> None:
+    """With limits between robots the decomposition may end without a proof: the monolith goes on from its plan."""
+    options, left_s = search.options, search.options.left_s()
+    small = column_count(search.problem) <= SMALL_COLUMNS
+    shares = [COUPLED_S if small else None, None if left_s is None else COUPLED_SHARE * left_s]
+    known = [share for share in shares if share is not None]
+    _routes(search, time.perf_counter() + min(known) if known and options.work_limit is None else None)
+    if _proven(search) or search.infeasible is not None or options.stopped():
+        return
+    search.method = "routes, then monolith: limits between robots kept the decomposition from a proof"
+    solver, notes = search.solver, search.limit
+    _monolith(search)
+    search.settings["routes"] = {"solver": solver, "limit": notes}
+
+
+def _routes(search: Search, until: float | None = None) -> None:
     """Solve by the decomposition; with fixed first steps, the rest is a problem of its own."""
     options, known, frozen = search.options, search.best, search.frozen
     problem = search.problem if frozen is None else frozen.problem
@@ -181,10 +214,10 @@ def _routes(search: Search) -> None:
             elapsed_s, None if incumbent is None else incumbent + shift, None if bound is None else bound + shift
         )
 
-    deadline = options.deadline
+    latest = None if options.deadline is None else options.deadline - _check_reserve_s(search)
     result = solve_routes(
         problem,
-        deadline=None if deadline is None else deadline - _check_reserve_s(search),
+        deadline=min((t for t in (until, latest) if t is not None), default=None),
         work_limit=options.work_limit,
         gap=options.gap,
         threads=options.threads,
