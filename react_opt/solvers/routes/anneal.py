@@ -26,6 +26,7 @@ from react_opt.solvers.routes.moves import (
     swap_tails,
 )
 from react_opt.solvers.routes.problem import FloatArray, IntArray
+from react_opt.solvers.routes.ranking import inner, ranking
 
 _DELAYS = 8  # delays whose loss is tabulated
 _BLINK = 0.02  # share of positions that an insertion overlooks
@@ -33,7 +34,7 @@ _STRING = 10  # longest string usually removed
 _REACH = 12  # nearest cells that a segment move chooses from
 
 
-@kernel(nogil=True)
+@inner
 def _state(robots: int, n_cells: int) -> State:
     return State(
         np.zeros((robots, n_cells), dtype=np.int32),
@@ -47,11 +48,20 @@ def _state(robots: int, n_cells: int) -> State:
     )
 
 
-@kernel(nogil=True)
+@inner
+def _copy(order: Order, lengths: IntArray, to_order: Order, to_lengths: IntArray) -> None:
+    for r in range(len(lengths)):
+        to_lengths[r] = lengths[r]
+        for k in range(lengths[r]):
+            to_order[r, k] = order[r, k]
+
+
+@inner
 def _tabulate(r: int, s: State, tables: Tables, loss: FloatArray) -> None:
     """``loss[r, k, d]``: coverage lost when everything from position k on comes d steps later."""
     horizon, reward, length = tables.horizon, tables.reward, s.lengths[r]
-    loss[r, length, :] = 0.0
+    for d in range(loss.shape[2]):
+        loss[r, length, d] = 0.0
     for k in range(length - 1, -1, -1):
         cell, t = s.order[r, k], s.arrival[r, k]
         for d in range(loss.shape[2]):
@@ -61,7 +71,7 @@ def _tabulate(r: int, s: State, tables: Tables, loss: FloatArray) -> None:
             loss[r, k, d] = loss[r, k + 1, d] + reward[cell, t] - now
 
 
-@kernel(nogil=True)
+@inner
 def _insert(cell: int, s: State, tables: Tables, loss: FloatArray, random: RandomState) -> int:
     """Insert a cell where it adds most (positions are missed now and then); the robot, or -1 if nowhere."""
     horizon, reward, sigma = tables.horizon, tables.reward, tables.sigma
@@ -110,7 +120,7 @@ def _insert(cell: int, s: State, tables: Tables, loss: FloatArray, random: Rando
     return best_r
 
 
-@kernel(nogil=True)
+@inner
 def _ruin(s: State, tables: Tables, removed: Order, touched: NDArray[np.bool_], random: RandomState) -> int:
     """Take strings out around a random cell, unserved cells nearby too; returns how many ``removed`` now holds."""
     near = tables.near
@@ -147,7 +157,7 @@ def _ruin(s: State, tables: Tables, removed: Order, touched: NDArray[np.bool_], 
     return count
 
 
-@kernel(nogil=True)
+@inner
 def _recreate(
     s: State, tables: Tables, removed: Order, touched: NDArray[np.bool_], loss: FloatArray, random: RandomState
 ) -> None:
@@ -161,7 +171,7 @@ def _recreate(
     for k in range(len(removed)):
         far = float(tables.steps[tables.whole[0, 0], removed[k]])
         keys[k] = draw(random) if way < 0.6 else far if way < 0.8 else -far
-    for k in np.argsort(keys, kind="mergesort"):
+    for k in ranking(keys):
         cell = removed[k]
         s.owner[cell] = -1
         r = _insert(cell, s, tables, loss, random)
@@ -171,7 +181,7 @@ def _recreate(
             _tabulate(r, s, tables, loss)
 
 
-@kernel(nogil=True)
+@inner
 def _segment_move(
     bar: float, s: State, old: State, tables: Tables, touched: NDArray[np.bool_], random: RandomState
 ) -> bool:
@@ -234,17 +244,17 @@ def anneal(
     touched = np.zeros(robots, dtype=np.bool_)
     removed = np.empty(n_cells, dtype=np.int32)
     loss = np.empty((robots, n_cells + 1, _DELAYS))
-    s.order[:] = order
-    s.lengths[:] = lengths
+    _copy(order, lengths, s.order, s.lengths)
+    current = 0.0
     for r in range(robots):
         read(r, s, tables)
-    current = s.values.sum()
+        current += s.values[r]
     if current > best:
         best = current
-        best_order[:] = s.order
-        best_lengths[:] = s.lengths
+        _copy(s.order, s.lengths, best_order, best_lengths)
     for _ in range(iterations):
-        touched[:] = False
+        for r in range(robots):
+            touched[r] = False
         bar = heat * np.log(1.0 - draw(random))
         if draw(random) >= ruin_share:
             # The estimate overstates what is lost at the horizon, hence the margin.
@@ -258,13 +268,14 @@ def anneal(
                 keep(r, s, old)
             count = _ruin(s, tables, removed, touched, random)
             _recreate(s, tables, removed[:count], touched, loss, random)
-        total = s.values.sum()
+        total = 0.0
+        for r in range(robots):
+            total += s.values[r]
         if total > current + bar:
             current = total
             if current > best + 1e-9 * abs(best):
                 best = current
-                best_order[:] = s.order
-                best_lengths[:] = s.lengths
+                _copy(s.order, s.lengths, best_order, best_lengths)
             continue
         for r in range(robots):  # undo
             if touched[r]:
@@ -276,6 +287,5 @@ def anneal(
                 for k in range(s.lengths[r]):
                     s.order[r, k] = old.order[r, k]
                 read(r, s, tables)
-    order[:] = s.order
-    lengths[:] = s.lengths
+    _copy(s.order, s.lengths, order, lengths)
     return best

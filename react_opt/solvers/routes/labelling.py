@@ -7,7 +7,37 @@ from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
 from react_opt.solvers.routes.problem import FloatArray, IntArray
+from react_opt.solvers.routes.ranking import inner, ranking
 from react_opt.solvers.routes.residual import Mask
+
+
+@inner
+def _grown(array, room):  # type: ignore[no-untyped-def]  # one body for several types
+    larger = np.empty((room, array.shape[1]), dtype=array.dtype)
+    for k in range(len(array)):
+        for c in range(array.shape[1]):
+            larger[k, c] = array[k, c]
+    return larger
+
+
+@inner
+def _grown_1d(array, room):  # type: ignore[no-untyped-def]
+    larger = np.empty(room, dtype=array.dtype)
+    for k in range(len(array)):
+        larger[k] = array[k]
+    return larger
+
+
+@inner
+def _rehashed(slots: IntArray, hashes: NDArray[np.uint64], labels: int) -> IntArray:
+    """Table of four times the size; later labels of a hash take the place of earlier ones, which they chain."""
+    larger = np.full(4 * len(slots), -1, dtype=np.int64)
+    for n in range(labels):
+        slot = np.int64(hashes[n] & np.uint64(len(larger) - 1))
+        while larger[slot] >= 0 and hashes[larger[slot]] != hashes[n]:
+            slot = (slot + 1) & (len(larger) - 1)
+        larger[slot] = n
+    return larger
 
 
 @kernel(nogil=True)
@@ -58,11 +88,14 @@ def beam(
     zobrist
         ``(2, n_cells)`` random words of the hash of a cell and a set of cells.
     """
-    battery_j, capacity_j, reserve_j, wait_j, sense_j = numbers[:5]
-    sigma, extra, floor, slack = numbers[5:9]
+    battery_j, capacity_j, reserve_j = numbers[0], numbers[1], numbers[2]
+    wait_j, sense_j, sigma = numbers[3], numbers[4], numbers[5]
+    extra, floor, slack = numbers[6], numbers[7], numbers[8]
     n_cells = gain.shape[0]
     words = (n_cells + 63) // 64
-    total_price = price.sum()
+    total_price = 0.0
+    for cell in range(n_cells):
+        total_price += price[cell]
     # Candidates: rank, value, battery, price of the collected, charge | cell, parent, arc, sensed, next | hash.
     room = 4096
     c_num = np.empty((room, 5))
@@ -115,7 +148,7 @@ def beam(
             batch[k] = c
             rank[k] = -c_num[c, 0]
             c = c_int[c, 4]
-        order = np.argsort(rank, kind="mergesort")
+        order = ranking(rank)
         first_label = labels
         for position in range(count):
             c = batch[order[position]]
@@ -264,29 +297,3 @@ def beam(
         chain[k, 3], chain[k, 4] = l_int[e, 4], l_num[e, 3]
         e = l_int[e, 2]
     return chain, best, complete
-
-
-@kernel(nogil=True)
-def _grown(array, room):  # type: ignore[no-untyped-def]  # one body for several types
-    larger = np.empty((room, array.shape[1]), dtype=array.dtype)
-    larger[: len(array)] = array
-    return larger
-
-
-@kernel(nogil=True)
-def _grown_1d(array, room):  # type: ignore[no-untyped-def]
-    larger = np.empty(room, dtype=array.dtype)
-    larger[: len(array)] = array
-    return larger
-
-
-@kernel(nogil=True)
-def _rehashed(slots: IntArray, hashes: NDArray[np.uint64], labels: int) -> IntArray:
-    """Table of four times the size; later labels of a hash take the place of earlier ones, which they chain."""
-    larger = np.full(4 * len(slots), -1, dtype=np.int64)
-    for n in range(labels):
-        slot = np.int64(hashes[n] & np.uint64(len(larger) - 1))
-        while larger[slot] >= 0 and hashes[larger[slot]] != hashes[n]:
-            slot = (slot + 1) & (len(larger) - 1)
-        larger[slot] = n
-    return larger

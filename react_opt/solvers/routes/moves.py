@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from react_opt.kernels import kernel
 from react_opt.solvers.routes.problem import FloatArray, IntArray
+from react_opt.solvers.routes.ranking import inner
 from react_opt.solvers.routes.sequences import Steps
 
 Order = NDArray[np.int32]
@@ -54,7 +54,7 @@ class State(NamedTuple):
     moment: FloatArray
 
 
-@kernel(nogil=True)
+@inner
 def draw(random: RandomState) -> float:
     """Next uniform number in [0, 1) of a xorshift generator whose state is ``(1,)`` and not zero."""
     x = random[0]
@@ -66,7 +66,7 @@ def draw(random: RandomState) -> float:
     return uniform
 
 
-@kernel(nogil=True)
+@inner
 def read(r: int, s: State, tables: Tables) -> None:
     """Read the sequence of robot r: drop what it cannot serve, and set all that `State` says of it.
 
@@ -119,14 +119,14 @@ def read(r: int, s: State, tables: Tables) -> None:
     s.values[r] = value - sigma * (spent + rest * wait_j)
 
 
-@kernel(nogil=True)
+@inner
 def _delay(s: State, r: int, first: int, later: float) -> float:
     """Estimated loss when everything of robot r from position ``first`` on comes ``later`` steps later."""
     loss: float = later * (s.slope[r, s.lengths[r]] - s.slope[r, first])
     return loss
 
 
-@kernel(nogil=True)
+@inner
 def keep(r: int, s: State, old: State) -> None:
     """Keep the sequence of a robot before it is changed."""
     old.lengths[r] = s.lengths[r]
@@ -135,7 +135,7 @@ def keep(r: int, s: State, old: State) -> None:
         old.order[r, k] = s.order[r, k]
 
 
-@kernel(nogil=True)
+@inner
 def swap_tails(a: int, b: int, bar: float, s: State, old: State, tables: Tables) -> bool:
     """Let b and what follows it come after a, and what followed a come where b was (two robots).
 
@@ -165,7 +165,7 @@ def swap_tails(a: int, b: int, bar: float, s: State, old: State, tables: Tables)
     return True
 
 
-@kernel(nogil=True)
+@inner
 def reverse(a: int, b: int, bar: float, s: State, old: State, tables: Tables) -> bool:
     """Drive backwards what lies between a and b, of one robot, so that they become neighbours."""
     steps = tables.steps
@@ -193,7 +193,7 @@ def reverse(a: int, b: int, bar: float, s: State, old: State, tables: Tables) ->
     return True
 
 
-@kernel(nogil=True)
+@inner
 def shift(a: int, b: int, size: int, flip: bool, bar: float, s: State, old: State, tables: Tables) -> bool:
     """Move ``size`` cells from b on (or, driven backwards, up to b) behind a."""
     steps = tables.steps
@@ -257,7 +257,7 @@ def shift(a: int, b: int, size: int, flip: bool, bar: float, s: State, old: Stat
     return True
 
 
-@kernel(nogil=True)
+@inner
 def join(a: int, b: int, bar: float, s: State, old: State, tables: Tables) -> bool:
     """Serve b, which nobody serves, right after a."""
     r, ia = s.owner[a], s.position[a]
@@ -278,7 +278,7 @@ def join(a: int, b: int, bar: float, s: State, old: State, tables: Tables) -> bo
     return True
 
 
-@kernel(nogil=True)
+@inner
 def skip(b: int, bar: float, s: State, old: State, tables: Tables) -> bool:
     """No longer serve b."""
     r, ib = s.owner[b], s.position[b]

@@ -290,10 +290,12 @@ def shape_prices(
     """
     horizon, n_cells = gain.shape[1] - 1, gain.shape[0]
     choice = np.empty((horizon + 1, n_cells), dtype=np.int32)
-    price = price.copy()
-    extra = 0.0
-    best_price, best_extra, best_bound = price.copy(), 0.0, np.inf
+    given, price, best_price = price, np.empty(n_cells), np.empty(n_cells)
     visits = np.zeros(n_cells)
+    for j in range(n_cells):
+        price[j] = best_price[j] = given[j]
+    extra = 0.0
+    best_extra, best_bound = 0.0, np.inf
     theta = 1.0
     stale = 0
     for _ in range(max(1, iterations)):
@@ -302,10 +304,12 @@ def shape_prices(
             out_start, arc_to, arc_steps, arc_energy_j, start_step, wait_j, sense_j, joule, gain, price, need,
             drive, charge_j, choice,
         )  # fmt: skip
-        visits[:] = 0.0
         spent = 0.0
         t, i = start_step, start
-        bound = values[t, i] + price.sum() + extra * max(spare_j, 0.0)
+        bound = values[t, i] + extra * max(spare_j, 0.0)
+        for j in range(n_cells):
+            visits[j] = 0.0
+            bound += price[j]
         first = gain[i, t] - joule * sense_j - price[i]
         if gain[i, t] > 0.0 and first > 0.0:
             bound += first
@@ -318,7 +322,8 @@ def shape_prices(
                 stale = 0
         if bound < best_bound:
             best_bound, best_extra = bound, extra
-            best_price[:] = price
+            for j in range(n_cells):
+                best_price[j] = price[j]
         if bound <= floor or values[t, i] == -np.inf:
             break
         while True:
