@@ -138,14 +138,14 @@ def to_lattice(program: Program) -> Lattice:
     for i, terms in enumerate(exact.rows):
         scale = factor[i] or common_step([a for _, a in terms])
         columns, whole = [j for j, _ in terms], [int(a * step[j] / scale) for j, a in terms]
-        least, most = _range(exact, f"the row {exact.row(i)}", columns, whole, lower, upper)
+        least, most = _range(exact, i, columns, whole, lower, upper)
         low, high = exact.row_lower[i], exact.row_upper[i]
         low_n = least if low is None else max(least, math.ceil(low / scale))
         lattice_rows.append((columns, whole, low_n, most if high is None else min(most, math.floor(high / scale))))
     cost = [c * s for c, s in zip(exact.cost, step, strict=True)]
     objective_scale = 1 / common_step(cost)
     objective = [int(c * objective_scale) for c in cost]
-    _range(exact, "the objective", list(range(len(step))), objective, lower, upper)
+    _range(exact, None, list(range(len(step))), objective, lower, upper)
     return Lattice(step, lower, upper, lattice_rows, objective, objective_scale)
 
 
@@ -248,14 +248,15 @@ def _bound_all(exact: _Exact) -> None:
 
 
 def _range(
-    exact: _Exact, what: str, columns: list[int], whole: list[int], lower: list[int], upper: list[int]
+    exact: _Exact, i: int | None, columns: list[int], whole: list[int], lower: list[int], upper: list[int]
 ) -> tuple[int, int]:
-    """Return the least and the largest value of a sum, which 64 bits must hold with room to spare."""
+    """Return the least and the largest value of row i or the objective; 64 bits must hold it with room to spare."""
     least = sum(a * (lower[j] if a > 0 else upper[j]) for j, a in zip(columns, whole, strict=True))
     most = sum(a * (upper[j] if a > 0 else lower[j]) for j, a in zip(columns, whole, strict=True))
     largest = max(
         (abs(a) * max(abs(lower[j]), abs(upper[j]), 1) for j, a in zip(columns, whole, strict=True)), default=0
     )
     if max(abs(least), abs(most), largest) > LARGEST:
+        what = "the objective" if i is None else f"the row {exact.row(i)}"
         raise exact.refusal(f"{what} needs whole numbers above 2**60")
     return least, most
