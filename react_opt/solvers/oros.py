@@ -78,7 +78,9 @@ class Search:
         self.options.on_progress(elapsed_s, max(values, default=None), min(bounds))
 
 
-def solve_oros(instance: OrosInstance, options: SolveOptions, start: Plan | None, at_step: int | None) -> OrosPlan:
+def solve_oros(
+    instance: OrosInstance, options: SolveOptions, start: Plan | None = None, at_step: int | None = None
+) -> OrosPlan:
     """Solve an ``oros`` instance; see :func:`react_opt.solve`."""
     entries = len(instance.cells) * (instance.horizon_steps + 1)
     rows = sum(instance.horizon_steps + 1 - robot.start_step for robot in instance.robots)

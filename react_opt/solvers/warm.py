@@ -1,0 +1,126 @@
+"""First use: compiled kernels are loaded, or compiled and cached on disk, before any clock runs."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from react_opt.instance import (
+    AssignmentInstance,
+    Document,
+    InspectionInstance,
+    OrosInstance,
+)
+from react_opt.options import SolveOptions
+
+ANNOUNCE_AFTER_S = 4.0  # loading from the cache takes less
+_warm: set[str] = set()
+
+
+def warm_up(kind: str, solver: Callable[..., Any]) -> float:
+    """Run tiny instances of a kind once per process, so that every kernel is ready; return the seconds it took.
+
+    A machine's first use compiles for a minute or two, which is announced through the ``react_opt`` logger (on
+    standard error where logging is not configured); later uses load the cache.
+
+    Parameters
+    ----------
+    kind
+        Kind of instance.
+    solver
+        The recipe of that kind, called with an instance, options and no start.
+    """
+    if kind in _warm:
+        return 0.0
+    begun = time.perf_counter()
+    with _announced():
+        for instance in _TINY[kind]():
+            solver(instance, SolveOptions(time_limit_s=None, work_limit=40, threads=1, explain=True), None)
+    _warm.add(kind)
+    return time.perf_counter() - begun
+
+
+@contextmanager
+def _announced() -> Iterator[None]:
+    text = "compiling kernels for their first use on this machine: a minute or two, cached afterwards"
+    timer = threading.Timer(ANNOUNCE_AFTER_S, logging.getLogger("react_opt").warning, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _oros() -> Iterator[Document]:
+    """A ring of cells with a chord: batteries that bind and that do not, with and without limits between robots."""
+    n, horizon = 8, 10
+    travel = [
+        {"from": f"c{i}", "to": f"c{j % n}", "steps": d, "energy_j": 3.0 * d}
+        for i in range(n)
+        for j, d in ((i + 1, 1), (i - 1, 1), (i + 3, 2))
+    ]
+    for battery_j, limits in ((1000.0, {}), (60.0, {}), (1000.0, {"robots_per_cell": 1, "forbid_swaps": True})):
+        robots = [
+            {"id": f"r{k}", "start": f"c{k}", "battery_j": battery_j, "capacity_j": battery_j, "idle_w": 1.0,
+             "sensing_w": 5.0, "start_step": k}
+            for k in range(2)
+        ]  # fmt: skip
+        yield OrosInstance.model_validate(
+            {
+                "name": "warm-up", "horizon_steps": horizon, "step_s": 1.0, "travel": travel, "robots": robots,
+                "cells": [{"id": f"c{i}", "x_m": 0.0, "y_m": 0.0, "weight": 1.0 + i % 3} for i in range(n)],
+                "limits": limits,
+            }
+        )  # fmt: skip
+
+
+def _assignment() -> Iterator[Document]:
+    """Plain, and with capacities and conflicts."""
+    for capacity, conflicts in ((1, []), (2, [["t0", "t1"], ["t1", "t2"]])):
+        yield AssignmentInstance.model_validate(
+            {
+                "name": "warm-up",
+                "robots": [{"id": f"r{r}", "battery_j": 30.0, "capacity": capacity} for r in range(2)],
+                "targets": [{"id": f"t{k}", "gain": 5.0 + k} for k in range(4)],
+                "costs": [
+                    {"robot": f"r{r}", "target": f"t{k}", "time_s": 1.0 + (r + k) % 3, "energy_j": 9.0 + k}
+                    for r in range(2)
+                    for k in range(4)
+                ],
+                "conflicts": conflicts,
+            }
+        )
+
+
+def _inspection() -> Iterator[Document]:
+    """Two robots and a handful of targets on a line, with a time budget that leaves some out."""
+    names = [f"t{k}" for k in range(6)]
+    at = {"a": 0.0, **{name: 1.0 + k for k, name in enumerate(names)}}
+    travel = [
+        {"from": i, "to": j, "time_s": abs(at[i] - at[j]), "energy_j": 2.0 * abs(at[i] - at[j])}
+        for i in at
+        for j in at
+        if i != j
+    ]
+    yield InspectionInstance.model_validate(
+        {
+            "name": "warm-up", "time_left_s": 7.0, "travel": travel,
+            "robots": [
+                {"id": "r0", "at": "a", "battery_j": 14.0},
+                {"id": "r1", "at": "t3", "battery_j": 9.0, "end": "a"},
+            ],
+            "targets": [{"id": name, "value": 1.0 + k % 2, "service_s": 0.5} for k, name in enumerate(names)],
+        }
+    )  # fmt: skip
+
+
+_TINY: dict[str, Callable[[], Iterator[Document]]] = {
+    "oros": _oros,
+    "assignment": _assignment,
+    "inspection": _inspection,
+}
