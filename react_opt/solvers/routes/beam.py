@@ -134,6 +134,22 @@ def needed_battery(problem: RouteProblem, group: RobotClass, rest: Leftover) -> 
     )  # fmt: skip
 
 
+def affordable_width(problem: RouteProblem, width: int, expansions: int) -> int:
+    """Width of a beam that looks at no more than so many pairs of label and arc, at least 4.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    width
+        Width wished for.
+    expansions
+        Pairs of label and arc; a hundred thousand take some hundredths of a second.
+    """
+    per_label = 1 + problem.n_arcs // max(1, problem.n_cells)
+    return min(width, max(4, expansions // (problem.horizon * per_label + 1)))
+
+
 def battery_can_bind(problem: RouteProblem, group: RobotClass) -> bool:
     """Whether a robot of the class might spend more than it has above its reserve by the horizon.
 

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from react_opt.solvers.routes.beam import Response, best_response, needed_battery
+from react_opt.solvers.routes.beam import Response, affordable_width, best_response, needed_battery
 from react_opt.solvers.routes.problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.replay import coupling_faults, feasible
 from react_opt.solvers.routes.residual import leftover
 
 _WIDTH = 64
+_EXPANSIONS = 60_000  # labels times arcs that one response may look at
 _TRIES = 400  # responses per robot before the search for a plan gives up
 
 
@@ -121,6 +122,7 @@ def greedy(problem: RouteProblem, deadline: float | None = None, seed: int = 0) 
     routes: list[Route | None] = [None] * len(classes)
     waiting = list(range(len(classes)))
     prices: FloatArray | None = None
+    usual = affordable_width(problem, _WIDTH, _EXPANSIONS)
     limit = _TRIES * len(classes)
     for count in range(limit):
         late = deadline is not None and time.perf_counter() > deadline
@@ -134,7 +136,7 @@ def greedy(problem: RouteProblem, deadline: float | None = None, seed: int = 0) 
             problem,
             classes[number],
             fixed,
-            width=1 if late else _WIDTH if calm else int(rng.integers(1, 9)),
+            width=1 if late else usual if calm else int(rng.integers(1, 9)),
             prices=prices,
             price_steps=0 if late else 10,
             noise=noise,

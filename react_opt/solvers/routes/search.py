@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from react_opt.solvers.routes.anneal import anneal
-from react_opt.solvers.routes.beam import best_response
+from react_opt.solvers.routes.beam import affordable_width, best_response
 from react_opt.solvers.routes.greedy import route_classes
 from react_opt.solvers.routes.moves import Tables
 from react_opt.solvers.routes.problem import FloatArray, Route, RouteProblem
@@ -47,7 +47,6 @@ class _Search:
         endless = deadline is None and should_stop is None
         self.work_limit = _DEFAULT_WORK if work_limit is None and endless else work_limit
         self.work = 0
-        self.degree = 2 + problem.n_arcs // max(1, problem.n_cells)
         self.chunk_share = 0.0  # of the time or work, by one chunk of annealing
         self.prices: dict[int, FloatArray] = {}
 
@@ -83,7 +82,7 @@ class _Search:
     def answer(self, number: int, fixed: Sequence[Route], width: int, floor: float, noisy: bool) -> Route | None:
         """Best response of one robot to fixed routes; counts as one iteration."""
         self.work += 1
-        width = min(width, max(8, int(_EXPANSIONS / (self.problem.horizon * self.degree + 1))))
+        width = affordable_width(self.problem, width, _EXPANSIONS)
         noise = np.exp(self.rng.normal(0.0, 0.3, self.problem.n_cells)) if noisy else None
         response = best_response(
             self.problem,
