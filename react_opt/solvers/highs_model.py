@@ -117,3 +117,11 @@ def completed(program: Program, x: FloatArray, deadline: float | None = None) ->
         return None
     solution = np.array(highs.getSolution().col_value, dtype=np.float64)
     return np.where(program.integer, np.round(solution), solution)
+
+
+def fresh_scheduler() -> None:
+    """Let HiGHS start its scheduler anew in this thread.
+
+    The first run in a thread fixes its number of threads; a later model that asks for another number would fail.
+    """
+    highspy.Highs.resetGlobalScheduler(True)

@@ -173,9 +173,6 @@ def _choose(search: Search) -> Any:
         search.method = f"monolith: the solver {options.solver} was asked for"
     elif unpriced_because is not None:
         search.method = f"monolith: {unpriced_because}"
-    elif not _coupled(search.problem):
-        search.method = "routes"
-        return _routes
     else:
         search.method = "routes"
         return _routes_then_monolith
@@ -189,18 +186,25 @@ def _coupled(problem: RouteProblem) -> bool:
 
 
 def _routes_then_monolith(search: Search) -> None:
-    """With limits between robots the decomposition may end without a proof: the monolith goes on from its plan."""
+    """Where the decomposition ends without a proof, which limits between robots may cause, the monolith goes on."""
+    coupled = _coupled(search.problem)
+    _routes(search, _until(search) if coupled else None)
+    ended = coupled or search.limit == "none"
+    if _proven(search) or not ended or search.infeasible is not None or search.options.stopped():
+        return
+    cause = "limits between robots kept it from a proof" if coupled else "it ended without a proof"
+    search.method = f"routes, then monolith: {cause}"
+    search.settings["routes"] = {"solver": search.solver, "limit": search.limit}
+    _monolith(search)
+
+
+def _until(search: Search) -> float | None:
+    """Return when the decomposition leaves the rest of the time to the monolith."""
     options, left_s = search.options, search.options.left_s()
     small = column_count(search.problem) <= SMALL_COLUMNS
     shares = [COUPLED_S if small else None, None if left_s is None else COUPLED_SHARE * left_s]
     known = [share for share in shares if share is not None]
-    _routes(search, time.perf_counter() + min(known) if known and options.work_limit is None else None)
-    if _proven(search) or search.infeasible is not None or options.stopped():
-        return
-    search.method = "routes, then monolith: limits between robots kept the decomposition from a proof"
-    solver, notes = search.solver, search.limit
-    _monolith(search)
-    search.settings["routes"] = {"solver": solver, "limit": notes}
+    return time.perf_counter() + min(known) if known and options.work_limit is None else None
 
 
 def _routes(search: Search, until: float | None = None) -> None:

@@ -21,6 +21,7 @@ from react_opt.plan import (
     Stop,
     gap_of,
 )
+from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.inspection.baseline import Gate, gate, simple_rule
 from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.decompose import Answer, Decomposition
@@ -57,6 +58,7 @@ def inspect(arrays: InspectionArrays, options: SolveOptions, routes: Routes | No
         if options.on_progress is not None:
             options.on_progress(time.perf_counter() - options.begun, value, bound)
 
+    fresh_scheduler()
     with Control(deadline, options.work_limit, options.should_stop) as control:
         search = Decomposition(
             arrays, control, threads=options.threads, seed=options.seed, gap=options.gap or 0.0, routes=routes,

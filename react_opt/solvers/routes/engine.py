@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from react_opt.route_problem import Route, RouteProblem
+from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes.budget import Budget, Limit, OnProgress, Standing
 from react_opt.solvers.routes.certificate import certificate
 from react_opt.solvers.routes.columns import Column
@@ -129,6 +130,7 @@ def solve_routes(
             standing.offer(first.routes)
         elif first.reason is not None and not isinstance(first.reason, str):
             return RoutesResult(None, None, None, "infeasible", "none", notes=(first.reason.text,))
+    fresh_scheduler()
     search = _Proof(problem, standing, threads, seed)
     search.run()
     return search.result()
