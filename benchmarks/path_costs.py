@@ -19,7 +19,7 @@ from react_opt.energy import RobotProfile
 from react_opt.geometry import load_map
 from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
 from react_opt.paths.exact import exact_costs
-from react_opt.paths.ompl_ import OmplPathCosts
+from react_opt.paths.ompl_costs import OmplPathCosts
 from react_opt.paths.protocol import PathCosts
 
 FACTORY = Path(__file__).parent.parent / "examples" / "factory" / "factory.yaml"

@@ -103,7 +103,7 @@ class Passages:
         """Return the planners of a map."""
         if self.kind == "exact":
             return [[exact_costs(space, each), exact_costs(space, each, method="fastest16")] for each in self.profiles]
-        from react_opt.paths.ompl_ import OmplPathCosts
+        from react_opt.paths.ompl_costs import OmplPathCosts
 
         free_m2 = np.count_nonzero(space.blocked == 0) * space.resolution_m**2
         samples = int(np.clip(_SAMPLES_PER_M2 * free_m2, 64, 2000))

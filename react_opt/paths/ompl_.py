@@ -1,7 +1,7 @@
-"""Path costs from OMPL's sampling-based planners, for the robot's real footprint, with an exact motion check.
+"""OMPL's sampling-based planners over padded grids, with an exact motion check.
 
-The only module that touches OMPL, which is imported when it is first used. What its Python wheel gets wrong, and
-what is done about it here:
+The only module that imports OMPL, when it is first used; :mod:`react_opt.paths.ompl_costs` makes path costs of it.
+What its Python wheel gets wrong, and what is done about it here:
 
 * Its default motion check samples a segment and accepts some that cross walls: every motion is tested by the
   exact rule of :mod:`react_opt.geometry.sight` instead.
@@ -13,42 +13,27 @@ what is done about it here:
   sight of each other are answered directly, and single-query planners run in a child process that is killed
   when it does not answer (:mod:`react_opt.paths.ompl_child`).
 * Wall-clock budgets are not reproducible: everything counts samples or iterations, with a seed.
-
-The state is a point of the plane, the robot's centre. For the disc around the footprint that is exact. A robot that
-turns on the spot and drives straight, as skid-steered ones do, sweeps a rectangle while it drives and a disc
-where it turns; with ``footprint="rectangle"`` a drive needs only half the robot's *width* to either side, and its
-ends the disc's radius: together they hold the swept rectangle exactly, heading included, without a third dimension.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import signal
+import threading
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
-from itertools import combinations, pairwise
-from types import SimpleNamespace
+from types import FrameType, SimpleNamespace
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
-from react_opt.energy import RobotProfile
-from react_opt.errors import MissingPartError, ReactError, UsageError
-from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
-from react_opt.geometry.sight import Padded, segment_free_px
-from react_opt.paths.grid import pull_straight
-from react_opt.paths.motion import polyline_px, terrain, totals
-from react_opt.paths.ompl_child import SearchProcess
-from react_opt.paths.protocol import CostTable, Path
-from react_opt.paths.roadmap import Roadmap, flat_pixels
-from react_opt.paths.sampled import FloatArray, Grids, IntArray, leg_times, tighten
+from react_opt.errors import MissingPartError, UsageError
+from react_opt.geometry.sight import segment_free_px
+from react_opt.paths.sampled import FloatArray, Grids, IntArray
 
 PlannerName = Literal["PRMstar", "BITstar", "InformedRRTstar", "RRTstar", "RRTConnect"]
+Parameters = Mapping[str, float]
 PLANNERS: tuple[PlannerName, ...] = get_args(PlannerName)
 """Planners of OMPL's wheel that answered every test query here, or said that they found nothing."""
-
-_ITERATIONS: dict[str, int] = {"BITstar": 4000, "InformedRRTstar": 6000, "RRTstar": 6000, "RRTConnect": 20000}
 
 
 def ompl() -> SimpleNamespace:
@@ -70,14 +55,24 @@ def ompl() -> SimpleNamespace:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Silence OMPL, which writes its messages to standard output (and calls reseeding an error)."""
+    """Silence OMPL, which writes its messages to standard output (and calls reseeding an error).
+
+    An interrupt waits until the end: raised in one of OMPL's callbacks, it would abort the process.
+    """
     util = ompl().util
     level = util.getLogLevel()
     util.setLogLevel(util.LOG_NONE)
+    caught: list[tuple[int, FrameType | None]] = []
+    main = threading.current_thread() is threading.main_thread()
+    handler = signal.signal(signal.SIGINT, lambda number, frame: caught.append((number, frame))) if main else None
     try:
         yield
     finally:
         util.setLogLevel(level)
+        if main:
+            signal.signal(signal.SIGINT, handler)
+        if caught and callable(handler):
+            handler(*caught[0])
 
 
 class _Samples:
@@ -101,7 +96,7 @@ class _Samples:
         return True
 
 
-def space(grids: Grids, seed: int, samples: _Samples | None = None) -> Any:
+def space_information(grids: Grids, seed: int, samples: _Samples | None = None) -> Any:
     """Return OMPL's space information over grids: the plane in pixels, with the exact checks.
 
     Parameters
@@ -159,16 +154,18 @@ class RoadmapPlanner:
     ----------
     grids
         Where the robot may stand and drive.
+    parameters
+        See :class:`react_opt.paths.ompl_costs.OmplPathCosts`.
     seed
         Seed of OMPL's own random numbers.
     """
 
-    def __init__(self, grids: Grids, seed: int) -> None:
+    def __init__(self, grids: Grids, parameters: Parameters, seed: int) -> None:
         parts = ompl()
         self._samples = _Samples()
         with quiet():
-            self._information = space(grids, seed, self._samples)
-            self._planner = parts.geometric.PRMstar(self._information)
+            self._information = space_information(grids, seed, self._samples)
+            self._planner = planner_named(self._information, "PRMstar", parameters)
             self._problem = parts.base.ProblemDefinition(self._information)
             self._planner.setProblemDefinition(self._problem)
             self._planner.setup()
@@ -203,7 +200,47 @@ class RoadmapPlanner:
         return nodes, np.stack((starts, np.concatenate([*ends, np.empty(0, dtype=np.int64)])), axis=1)
 
 
-def search(grids: Grids, planner: str, iterations: int, seed: int, start: FloatArray, goal: FloatArray) -> Any:
+def planner_named(information: Any, name: str, parameters: Parameters) -> Any:
+    """Return one of OMPL's planners with parameters set.
+
+    Parameters
+    ----------
+    information
+        OMPL's space information.
+    name
+        The planner.
+    parameters
+        What its setters are called with.
+
+    Raises
+    ------
+    UsageError
+        Where the planner has no such parameter, or not with such a value.
+    """
+    planner = getattr(ompl().geometric, name)(information)
+    known = _parameters(planner)
+    for key, value in parameters.items():
+        setter = getattr(planner, f"set{key}", None)
+        if setter is None or key not in known:
+            raise UsageError(f"expected a parameter of {name} ({', '.join(known)}), found {key!r}")
+        try:
+            setter(value)
+        except Exception as error:  # whatever the binding or OMPL itself objects to
+            raise UsageError(f"{name} does not take {key} = {value!r}") from error
+    return planner
+
+
+def _parameters(planner: Any) -> list[str]:
+    """Return the names of a planner's parameters."""
+    apart = {"Name", "ProblemDefinition", "DefaultConnectionStrategy"}
+    return [
+        name[3:] for name in dir(planner) if name.startswith("set") and name[3:4].isupper() and name[3:] not in apart
+    ]
+
+
+def search(
+    grids: Grids, planner: str, parameters: Parameters, iterations: int, seed: int, start: FloatArray, goal: FloatArray
+) -> FloatArray | None:
     """Run one single-query planner; it may hang, so only a child process calls this.
 
     Parameters
@@ -212,6 +249,8 @@ def search(grids: Grids, planner: str, iterations: int, seed: int, start: FloatA
         Where the robot may stand and drive.
     planner
         One of :data:`PLANNERS` but PRMstar.
+    parameters
+        See :class:`react_opt.paths.ompl_costs.OmplPathCosts`.
     iterations
         The planner stops when it has asked this often whether to stop.
     seed
@@ -226,7 +265,7 @@ def search(grids: Grids, planner: str, iterations: int, seed: int, start: FloatA
     """
     parts = ompl()
     with quiet():
-        information = space(grids, seed)
+        information = space_information(grids, seed)
         ends = []
         for point in (start, goal):
             ends.append(information.allocState())
@@ -234,7 +273,7 @@ def search(grids: Grids, planner: str, iterations: int, seed: int, start: FloatA
         problem = parts.base.ProblemDefinition(information)
         problem.setStartAndGoalStates(*ends)
         problem.setOptimizationObjective(parts.base.PathLengthOptimizationObjective(information))
-        solver = getattr(parts.geometric, planner)(information)
+        solver = planner_named(information, planner, parameters)
         solver.setProblemDefinition(problem)
         solver.setup()
         left = iterations
@@ -249,146 +288,3 @@ def search(grids: Grids, planner: str, iterations: int, seed: int, start: FloatA
             return None
         states = problem.getSolutionPath().getStates()
         return np.array([(state[0], state[1]) for state in states])
-
-
-class OmplPathCosts:
-    """Path costs of one robot on one map, by a planner of OMPL (an implementation of ``PathCosts``).
-
-    Parameters
-    ----------
-    space
-        Where the disc around the footprint may be.
-    profile
-        The robot.
-    planner
-        ``PRMstar`` grows one roadmap and answers every query from it. The others search once per pair, in a child
-        process; points in sight of each other are answered without them.
-    samples
-        Random milestones of the roadmap.
-    minimise
-        ``length``, or ``time`` by the speed law (PRMstar only): the roadmap's legs then cost what they take to drive,
-        and a path keeps away from walls.
-    iterations
-        How often a single-query planner may ask whether to stop; by default what suits it.
-    seed
-        Same seed, same queries in the same order: same answers.
-    footprint
-        ``disc``, or ``rectangle`` for a robot that turns on the spot and drives straight (see this module).
-    patience_s
-        A single-query planner that has not answered after this long is killed, and its pair stays absent.
-
-    Raises
-    ------
-    MissingPartError
-        Where OMPL is not installed.
-    UsageError
-        Where an option is not one of those above.
-    """
-
-    def __init__(
-        self,
-        space: FreeSpace,
-        profile: RobotProfile,
-        *,
-        planner: PlannerName = "PRMstar",
-        samples: int = 1000,
-        minimise: Literal["length", "time"] = "length",
-        iterations: int | None = None,
-        seed: int = 0,
-        footprint: Literal["disc", "rectangle"] = "disc",
-        patience_s: float = 20.0,
-    ) -> None:
-        if planner not in PLANNERS:
-            raise UsageError(f"expected a planner of {', '.join(PLANNERS)}, found {planner!r}")
-        if footprint not in ("disc", "rectangle"):
-            raise UsageError(f"a footprint is disc or rectangle, not {footprint!r}")
-        if samples < 1 or (iterations is not None and iterations < 1) or seed < 0:
-            raise UsageError("samples and iterations are at least 1, the seed at least 0")
-        if minimise not in ("length", "time") or (minimise == "time" and planner != "PRMstar"):
-            raise UsageError("OMPL paths minimise length, or with PRMstar time")
-        ompl()
-        self.space = space
-        self.profile = profile
-        self._field = terrain(space, profile)
-        drive = space.padded if footprint == "disc" else _straight(space, profile)
-        self._grids = Grids(space.padded, drive)
-        self._timed = minimise == "time"
-        self._child: SearchProcess | None = None
-        if planner == "PRMstar":
-            planned = RoadmapPlanner(self._grids, seed)
-            self._raw = Roadmap(self._grids, planned.grow, self._weigh, samples, seed).paths
-            work = f"{samples} samples"
-        else:
-            count = _ITERATIONS[planner] if iterations is None else iterations
-            self._child = SearchProcess(self._grids, planner, count, seed, patience_s)
-            self._raw = partial(_searched_paths, self._child, self._grids)
-            work = f"{count} iterations"
-        self.method = f"OMPL {planner}, {work}, least {minimise}, seed {seed}, {footprint}, refine {space.refine}"
-
-    def cost_table(self, points_m: ArrayLike) -> CostTable:
-        """Return length, time and energy of paths between all pairs of ``(n, 2)`` points, m."""
-        points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
-        n = len(points)
-        free = self.space.points_free(points)
-        measures = np.full((3, n, n), np.nan)  # length in m, driving time in s, turned angle in rad
-        measures[:, np.arange(n)[free], np.arange(n)[free]] = 0.0
-        for (i, j), path in self._between(np.ascontiguousarray(self.space.to_pixels(points)), free):
-            length, time, _, turned = self._measured(path)
-            measures[:, i, j] = measures[:, j, i] = length, time, turned
-        time_s, energy_j = totals(self.profile, *measures)
-        killed = self._child.killed if self._child else 0
-        method = f"{self.method}, {killed} queries killed" if killed else self.method
-        return CostTable(points, ~np.isnan(measures[0]), measures[0], time_s, energy_j, method)
-
-    def path(self, start_m: ArrayLike, goal_m: ArrayLike) -> Path | None:
-        """Return a path between two points, m, tested against the footprint; None where none was found."""
-        ends = np.array((start_m, goal_m), dtype=np.float64)
-        for _, path in self._between(np.ascontiguousarray(self.space.to_pixels(ends)), self.space.points_free(ends)):
-            length, time, clearance, turned = self._measured(path)
-            total, energy = totals(self.profile, length, time, turned)
-            points = self.space.to_world(path)
-            points[[0, -1]] = ends
-            return Path(points, float(length), float(total), float(energy), float(clearance))
-        return None
-
-    def _measured(self, path: FloatArray) -> tuple[float, float, float, float]:
-        """Return length, driving time, smallest clearance and turned angle, after testing every leg."""
-        if not all(self._grids.leg_free(a, b) for a, b in pairwise(path)):
-            raise ReactError("a path failed its check against the footprint")
-        return polyline_px(self._field, path)
-
-    def _between(self, pixels: FloatArray, free: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield ``(i, j)``, i < j, and a polished path in pixels, for every pair that has one."""
-        index = np.flatnonzero(free)
-        for (i, j), path in self._raw(pixels[index]):
-            yield (int(index[i]), int(index[j])), self._polished(path)
-
-    def _weigh(self, nodes: FloatArray, pairs: IntArray) -> FloatArray:
-        if self._timed:
-            return leg_times(self._field, nodes, pairs)
-        return np.asarray(np.hypot(*(nodes[pairs[:, 0]] - nodes[pairs[:, 1]]).T))
-
-    def _polished(self, path: FloatArray) -> FloatArray:
-        if self._timed:
-            return pull_straight(self._grids.drive, self._field, path, True, 1 / self.profile.turn_rad_s)
-        return tighten(self._grids.stand, self._grids.drive, path)
-
-
-def _straight(space: FreeSpace, profile: RobotProfile) -> Padded:
-    """Return where a straight drive may go: half the robot's width is enough to either side."""
-    width = Footprint(min(profile.width_m / 2, space.footprint.radius_m))
-    return inflate(space.source, width, unknown=space.unknown, rule=space.rule, refine=space.refine).padded
-
-
-def _searched_paths(
-    child: SearchProcess, grids: Grids, points: FloatArray
-) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-    regions = np.asarray(ndimage.label(grids.drive == 0)[0], dtype=np.int32).ravel()
-    at = regions[flat_pixels(grids.stand, points)] if len(points) else np.empty(0, np.int32)
-    for i, j in combinations(range(len(points)), 2):
-        if grids.leg_free(points[i], points[j]):
-            yield (i, j), points[[i, j]]
-        elif at[i] == at[j]:
-            path = child.ask(points[i], points[j])
-            if path is not None:
-                yield (i, j), path

@@ -11,23 +11,24 @@ import contextlib
 import os
 import pickle
 import select
+import signal
 import struct
 import subprocess
 import sys
 import time
 import weakref
+from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy import ndimage
 
 from react_opt.errors import ReactError
+from react_opt.paths.roadmap import flat_pixels
+from react_opt.paths.sampled import FloatArray, Grids
 
-if TYPE_CHECKING:
-    from react_opt.paths.sampled import Grids
-
-FloatArray = NDArray[np.float64]
 _START_S = 120.0
 """How long the child may take to import everything, on a cold and busy machine."""
 
@@ -37,8 +38,11 @@ class SearchProcess:
 
     Parameters
     ----------
-    grids, planner, iterations, seed
-        See :func:`react_opt.paths.ompl_.search`; each query's seed also depends on its two ends alone.
+    grids
+        Where the robot may stand and drive.
+    setup
+        Planner, its parameters, iterations and seed, for :func:`react_opt.paths.ompl_.search`; a query's own seed
+        also depends on its two ends, and on nothing else.
     patience_s
         How long a query may take before the child is killed.
 
@@ -48,8 +52,9 @@ class SearchProcess:
         How many queries ended with the child's death.
     """
 
-    def __init__(self, grids: Grids, planner: str, iterations: int, seed: int, patience_s: float) -> None:
-        self._setup = (grids, planner, iterations, seed)
+    def __init__(self, grids: Grids, setup: tuple[str, dict[str, float], int, int], patience_s: float) -> None:
+        self._grids = grids
+        self._setup = setup
         self._patience_s = patience_s
         self._process: subprocess.Popen[bytes] | None = None
         self.killed = 0
@@ -67,6 +72,27 @@ class SearchProcess:
             self._process = None
         return path if done else None
 
+    def paths(self, points: FloatArray) -> Iterator[tuple[tuple[int, int], FloatArray]]:
+        """Yield ``(i, j)``, i < j, and a path, for every pair of points for which one was found.
+
+        Points in sight of each other are answered at once, and so are points that no search can connect.
+
+        Parameters
+        ----------
+        points
+            ``(n, 2)`` pixel coordinates where the robot may stand.
+        """
+        grids = self._grids
+        regions = np.asarray(ndimage.label(grids.drive == 0)[0], dtype=np.int32).ravel()
+        at = regions[flat_pixels(grids.stand, points)]
+        for i, j in combinations(range(len(points)), 2):
+            if grids.leg_free(points[i], points[j]):
+                yield (i, j), points[[i, j]]
+            elif at[i] == at[j]:
+                path = self.ask(points[i], points[j])
+                if path is not None:
+                    yield (i, j), path
+
     def _start(self) -> subprocess.Popen[bytes]:
         here = str(Path(__file__).resolve().parents[2])  # for a package that is on the path but not installed
         process = subprocess.Popen(
@@ -78,7 +104,7 @@ class SearchProcess:
         weakref.finalize(self, _end, process)
         assert process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
-            _send(process.stdin, self._setup)
+            _send(process.stdin, (self._grids, *self._setup))
         ready, fault = _receive(process.stdout, time.monotonic() + _START_S)
         if not ready or fault is not None:
             _end(process)
@@ -119,6 +145,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def main() -> None:
     """Answer queries from standard input until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the parent, which ends this process
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     queries = sys.stdin.buffer
@@ -127,7 +154,7 @@ def main() -> None:
         head = queries.read(8)
         return pickle.loads(queries.read(struct.unpack("<Q", head)[0])) if len(head) == 8 else None
 
-    grids, planner, iterations, seed = read()
+    grids, planner, parameters, iterations, seed = read()
     try:
         from react_opt.paths.ompl_ import ompl, search
 
@@ -139,7 +166,7 @@ def main() -> None:
     while (query := read()) is not None:
         start, goal = query
         own = np.random.SeedSequence([seed, *np.concatenate(query).view(np.uint64).tolist()])
-        _send(answers, search(grids, planner, iterations, int(own.generate_state(1)[0]), start, goal))
+        _send(answers, search(grids, planner, parameters, iterations, int(own.generate_state(1)[0]), start, goal))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 Everything is in pixel coordinates on padded grids and is tested with the exact rule of
 :mod:`react_opt.geometry.sight`. There are two grids: ``stand``, where the robot may stand and turn, and
-``drive``, which a straight drive may pass (the same grid for a disc; see :class:`react_opt.paths.ompl_.OmplPathCosts`).
+``drive``, which a straight drive may pass (the same grid for a disc; see :mod:`react_opt.paths.ompl_costs`).
 """
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,7 +15,8 @@ from react_opt.errors import MissingPartError, UsageError
 from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
 from react_opt.geometry.occupancy import FREE, OccupancyMap
 from react_opt.paths.exact import exact_costs
-from react_opt.paths.ompl_ import PLANNERS, OmplPathCosts
+from react_opt.paths.ompl_ import PLANNERS, quiet
+from react_opt.paths.ompl_costs import OmplPathCosts
 from react_opt.paths.protocol import PathCosts
 from react_opt.paths.visibility import VisibilityCosts
 
@@ -165,6 +167,18 @@ def test_single_query_planners_answer_from_a_child_process(space: FreeSpace, pla
     assert (tables[0].length_m[found] >= exact.length_m[found] * (1 - 1e-6)).all()
 
 
+def test_parameters_of_a_planner_reach_it_and_wrong_ones_are_named(space: FreeSpace) -> None:
+    points = np.array([(1.0, 1.0), (5.0, 7.0)])
+    lengths = []
+    for chosen in ({}, {"SamplesPerBatch": 37}):
+        costs = OmplPathCosts(space, ROBOT, planner="BITstar", iterations=2000, parameters=chosen)
+        lengths.append(costs.cost_table(points).length_m[0, 1])
+    assert lengths[0] != lengths[1]
+    for wrong, message in (({"Samples": 3}, "SamplesPerBatch"), ({"SamplesPerBatch": "many"}, "does not take")):
+        with pytest.raises(UsageError, match=message):
+            OmplPathCosts(space, ROBOT, planner="BITstar", parameters=wrong)
+
+
 def test_a_planner_that_does_not_answer_is_killed_and_the_next_query_works(space: FreeSpace) -> None:
     points = np.array([(1.0, 1.0), (11.0, 7.0)])
     costs = OmplPathCosts(space, ROBOT, planner="RRTstar", iterations=10**12, patience_s=0.5)
@@ -194,8 +208,18 @@ def test_without_ompl_the_error_names_what_to_install(space: FreeSpace, monkeypa
 
 
 def test_importing_the_module_does_not_import_ompl() -> None:
-    code = "import sys, react_opt.paths.ompl_; sys.exit('ompl' in sys.modules)"
+    code = "import sys, react_opt.paths.ompl_costs; sys.exit('ompl' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_an_interrupt_waits_for_the_planner_and_is_not_lost(space: FreeSpace) -> None:
+    # raised inside one of OMPL's callbacks it would abort the whole process
+    OmplPathCosts(space, ROBOT, samples=10)
+    with pytest.raises(KeyboardInterrupt), quiet():
+        signal.raise_signal(signal.SIGINT)
+        waited = True
+    assert waited
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_nothing_is_printed(space: FreeSpace, capfd: pytest.CaptureFixture[str]) -> None:
