@@ -7,8 +7,8 @@ routes out, and what little is left is an integer program for HiGHS.
 
 from __future__ import annotations
 
-import itertools
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,10 @@ import highspy
 import numpy as np
 
 from react_opt.kernels import kernel
-from react_opt.models.inspection import FloatArray, InspectionArrays, IntArray
-from react_opt.solvers.inspection.master import Column, matrix_of, quiet
+from react_opt.models.inspection import FloatArray, InspectionArrays
+from react_opt.solvers.inspection.master import CUTS_PER_ROUND, Column, broken_triples, matrix_of, quiet
 
-CUTS_PER_ROUND = 30
 ROUNDS = 25
-LEAST_VIOLATION = 0.02
 MOST_STEPS = 3_000_000
 
 
@@ -122,6 +120,8 @@ class Closing:
         None in stage 1 (``-value`` is minimised), else the value that stage 2 keeps (cost is minimised).
     cutoff
         Only choices with an objective of at most this matter.
+    cuts
+        Subset-row cuts to begin with.
     """
 
     def __init__(
@@ -131,13 +131,14 @@ class Closing:
         columns: list[Column],
         least_value: float | None,
         cutoff: float,
+        cuts: Sequence[tuple[int, int, int]] = (),
     ) -> None:
         self.sizes, self.columns, self.least_value, self.cutoff = sizes, columns, least_value, cutoff
         self._n = len(arrays.value)
         self._visits = np.zeros((self._n, len(columns)), np.bool_)
         for p, column in enumerate(columns):
             self._visits[list(column.stops), p] = True
-        self._cuts: list[IntArray] = []
+        self._cuts = list(cuts)
         self._left = np.arange(len(columns))
         self._gone = np.zeros(len(columns), np.bool_)
         self._model = quiet()
@@ -156,6 +157,8 @@ class Closing:
         if not self.columns:
             return Choice(None, True)
         self._model.passModel(self._program())
+        for triple in self._cuts:
+            self._add(triple)
         rounding = 1e-9 * max(1.0, abs(self.cutoff))
         for _ in range(ROUNDS):
             if deadline is not None and time.perf_counter() >= deadline:
@@ -241,22 +244,14 @@ class Closing:
     def _cut(self, x: FloatArray) -> bool:
         """Add the most violated subset-row cuts; False where there is none."""
         used = np.flatnonzero(x > 1e-9)
-        busy = np.flatnonzero((self._visits[:, self._left[used]] @ x[used]) > 1e-6)
-        if len(busy) < 3:
-            return False
-        triples = np.array(list(itertools.combinations(busy.tolist(), 3)), dtype=np.int64)
-        part = self._visits[:, self._left[used]].astype(np.int8)
-        twice = part[triples[:, 0]] + part[triples[:, 1]] + part[triples[:, 2]] >= 2
-        violation = twice @ x[used] - 1.0
-        worst = np.argsort(-violation, kind="stable")[:CUTS_PER_ROUND]
-        worst = worst[violation[worst] > LEAST_VIOLATION]
-        for at in worst.tolist():
-            self._cuts.append(triples[at])
-            self._add(triples[at])
-        return len(worst) > 0
+        found = broken_triples(self._visits[:, self._left[used]], x[used], CUTS_PER_ROUND)
+        for triple in found:
+            self._cuts.append(triple)
+            self._add(triple)
+        return len(found) > 0
 
-    def _add(self, triple: IntArray) -> None:
-        index = np.flatnonzero(self._visits[triple][:, self._left].sum(axis=0) >= 2).astype(np.int32)
+    def _add(self, triple: tuple[int, int, int]) -> None:
+        index = np.flatnonzero(self._visits[list(triple)][:, self._left].sum(axis=0) >= 2).astype(np.int32)
         self._model.addRow(-highspy.kHighsInf, 1.0, len(index), index, np.ones(len(index)))
 
     def _whole(self, deadline: float | None, node_limit: int | None, seed: int) -> Choice:

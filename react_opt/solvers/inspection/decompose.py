@@ -22,12 +22,16 @@ from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
 from react_opt.solvers.inspection.local import Searcher
 from react_opt.solvers.inspection.master import Column, Duals, Master
-from react_opt.solvers.inspection.pricing import Pricer, classes_of
+from react_opt.solvers.inspection.pricing import Cuts, Pricer, classes_of
 
 VALUE_TOLERANCE = 1e-7  # relative: plans whose values agree within it are worth the same
 COST_TOLERANCE = 1e-7
 HEURISTIC_LABELS, EXACT_LABELS, ENUMERATED_LABELS = 20_000, 3_000_000, 400_000
 MOST_COLUMNS = 40_000  # of the integer program over enumerated routes
+FEW_LABELS, FEW_COLUMNS = 20_000, 2500  # of an enumeration that is worth trying before cuts
+MOST_CUTS = 60
+MORE_PORTIONS = 3  # of local search where the first enumeration would be too large
+KNOWN_S = 0.5  # of the integer program over the routes known
 FIRST_PORTION = 400
 PORTION = 2000
 LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing limits the search
@@ -238,10 +242,12 @@ class Decomposition:
         answer = self.answer
         earned = sum(size * profit for size, profit in zip(self.sizes, best, strict=True))
         if second:
-            bound = duals.value * (self.master.least_value or 0.0) + float(duals.target.sum()) - earned
+            bound = (
+                duals.value * (self.master.least_value or 0.0) + float(duals.target.sum() + duals.cuts.sum()) - earned
+            )
             answer.cost_bound = max(bound, answer.cost_bound or 0.0)
             return
-        bound = earned - float(duals.target.sum())
+        bound = earned - float(duals.target.sum()) - float(duals.cuts.sum())
         if self.grid > 0:
             bound = math.floor(bound / self.grid + 1e-6) * self.grid
         if bound < answer.value_bound:
@@ -264,7 +270,20 @@ class Decomposition:
         if duals is None:
             return False
         self._search(min(PORTION, 50 * len(self.arrays.value)))
-        return done() or self._enumerate(duals, second) or done()
+        if done() or self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
+            return True
+        self._choose_known(second)
+        for _ in range(MORE_PORTIONS):
+            self._search(PORTION)
+        if done() or self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
+            return True
+        while self.pricers[0].elementary and not done() and self.master.cut(MOST_CUTS):
+            duals = self._generate(second)
+            if duals is None:
+                return done()
+            if self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
+                return True
+        return done() or self._enumerate(duals, second, ENUMERATED_LABELS, MOST_COLUMNS, last=True) or done()
 
     def _generate(self, second: bool) -> Duals | None:
         """Price until no route improves the linear program; its duals, None where it was stopped."""
@@ -284,7 +303,7 @@ class Decomposition:
                 if self._thread is not None:
                     self._collect()
                 continue
-            best = self._price_exactly(prize, rate, threshold)
+            best = self._price_exactly(prize, rate, threshold, self._cuts(duals))
             if best is None:
                 return None
             if duals.stand_in < 1e-6:
@@ -307,16 +326,13 @@ class Decomposition:
         return added > 0
 
     def _price_exactly(
-        self,
-        prize: FloatArray,
-        rate: float,
-        threshold: list[float],
+        self, prize: FloatArray, rate: float, threshold: list[float], cuts: Cuts | None
     ) -> tuple[list[float], int] | None:
         """Return the largest profits and the number of new columns, None where labels or time ran out."""
         best, added, whole = [], 0, True
         for pricer, least in zip(self.pricers, threshold, strict=True):
             self.control.work += 1
-            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, COLUMNS, self.control.flag)
+            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, COLUMNS, self.control.flag, cuts)
             added += self.master.add(found.columns)
             if found.best is None:
                 whole = False
@@ -326,6 +342,30 @@ class Decomposition:
             return best, added
         self.answer.stuck = self.answer.stuck or self.control.flag[0] == 0
         return None
+
+    def _choose_known(self, second: bool) -> None:
+        """Look for a better plan among the routes that the linear program has used."""
+        answer = self.answer
+        columns = [column for column in self.master.columns if len(set(column.stops)) == len(column.stops)]
+        left_s = self.control.left_s()
+        limit_s = KNOWN_S if left_s is None else min(KNOWN_S, 0.2 * left_s)
+        timed = self.control.work_limit is None
+        cutoff = answer.cost if second else -answer.value
+        cutoff -= COST_TOLERANCE * max(1.0, abs(cutoff))
+        closing = Closing(self.arrays, self.sizes, columns, self.master.least_value, cutoff, self.master.cuts)
+        found = closing.run(limit_s if timed else None, None if timed else MIP_NODES // 10, self.seed)
+        if found.chosen is not None:
+            self.offer(self._routes(found.chosen))
+
+    def _cuts(self, duals: Duals) -> Cuts | None:
+        if not self.master.cuts:
+            return None
+        bits, penalty = np.zeros(len(self.arrays.value), np.uint64), np.zeros(64)
+        for q, triple in enumerate(self.master.cuts):
+            penalty[q] = -duals.cuts[q]
+            for k in triple:
+                bits[k] |= np.uint64(1) << np.uint64(q)
+        return Cuts(bits, penalty)
 
     def _integral(self, second: bool) -> None:
         """Keep the solution of the linear program where it happens to be whole."""
@@ -339,8 +379,11 @@ class Decomposition:
             if self.arrays.is_feasible(routes):
                 self.offer(routes)
 
-    def _enumerate(self, duals: Duals, second: bool) -> bool:
-        """Enumerate what lies within the gap and choose; True where that proves the stage."""
+    def _enumerate(self, duals: Duals, second: bool, most_labels: int, most_columns: int, last: bool = False) -> bool:
+        """Enumerate what lies within the gap and choose; True where that proves the stage.
+
+        Where the routes are too many nothing is done, but in the ``last`` try, which chooses among those known.
+        """
         answer = self.answer
         rate = 1.0 if second else 0.0
         prize = duals.value * self.arrays.value + duals.target
@@ -348,16 +391,21 @@ class Decomposition:
         gap = answer.cost - (answer.cost_bound or 0.0) if second else -duals.objective - least
         gap += 1e-6 * max(1.0, abs(duals.objective))
         columns: list[Column] = []
-        whole = True
+        whole, cuts = True, self._cuts(duals)
         for pricer, price in zip(self.pricers, duals.group.tolist(), strict=True):
             self.control.work += 1
             found = pricer.price(
-                prize, rate, -price - gap, ENUMERATE, ENUMERATED_LABELS, MOST_COLUMNS, self.control.flag
+                prize, rate, -price - gap, ENUMERATE, most_labels, most_columns, self.control.flag, cuts
             )
-            whole = whole and found.best is not None and len(found.columns) < MOST_COLUMNS
+            whole = whole and found.best is not None and len(found.columns) < most_columns
             columns += found.columns
+            if not whole and not last:
+                return False
         self.notes["enumerated"] = self.notes.get("enumerated", 0) + len(columns)
-        if not whole or len(columns) > MOST_COLUMNS:
+        if not whole or len(columns) > most_columns:
+            if not last:
+                return False
+            whole = False
             answer.stuck = answer.stuck or self.control.flag[0] == 0
             columns = [column for column in self.master.columns if len(set(column.stops)) == len(column.stops)]
         left_s = self.control.left_s()
@@ -368,7 +416,7 @@ class Decomposition:
             cutoff = answer.cost - COST_TOLERANCE * max(1.0, answer.cost)
         else:
             cutoff = -least + 1e-6 * max(self.grid, self._value_slack())
-        closing = Closing(self.arrays, self.sizes, columns, self.master.least_value, cutoff)
+        closing = Closing(self.arrays, self.sizes, columns, self.master.least_value, cutoff, self.master.cuts)
         found_mip = closing.run(left_s, nodes, self.seed)
         if found_mip.chosen is not None:
             self.offer(self._routes(found_mip.chosen))

@@ -90,11 +90,24 @@ def _ahead(table: Any, first: Any, other: Any, i: int, used: float, width: float
     return float(table[i, b])
 
 
+@kernel
+def _charge(cuts: Any, penalty: Any) -> float:
+    """Return what a set of cuts charges."""
+    total, q = 0.0, 0
+    while cuts != np.uint64(0):
+        if cuts & np.uint64(1):
+            total += penalty[q]
+        cuts >>= np.uint64(1)
+        q += 1
+    return total
+
+
 @kernel(nogil=True)
 def best_routes(
     prize: Any, rate: float, cost: Any, time_s: Any, energy_j: Any, time_limit: float, energy_limit: float,
-    memory: Any, metric: bool, threshold: float, mode: int, n_time: int, n_energy: int, stop: Any, node: Any,
-    parent: Any, profit: Any, mask: Any, final: Any, used_t: Any, used_e: Any, after: Any, dead: Any,
+    memory: Any, metric: bool, threshold: float, mode: int, n_time: int, n_energy: int, in_cuts: Any, penalty: Any,
+    stop: Any, node: Any, parent: Any, profit: Any, mask: Any, final: Any, used_t: Any, used_e: Any, after: Any,
+    dead: Any, parity: Any,
 ) -> int:  # fmt: skip
     """Extend labels until none is left; fill ``node, parent, profit, mask, final`` and return their number.
 
@@ -118,14 +131,18 @@ def best_routes(
         ``HEURISTIC``, ``EXACT`` or ``ENUMERATE``.
     n_time, n_energy
         Buckets of the completion bounds in time and in energy, 0 to do without.
+    in_cuts, penalty
+        ``(N,)`` bits of the subset-row cuts that a target is in, and ``(64,)`` what each cut charges for every
+        second stop in it.
     stop
         ``(1,)`` set to nonzero by another thread to end early; the number returned is then negative.
     node, parent, profit, mask, final
         Out: per label its target (N: the start), its predecessor, its profit, its excluded targets, and its
         profit when it goes to the end from here (``-inf`` where it cannot). Their length is the number of
         labels at most; the number returned is negative where it does not suffice.
-    used_t, used_e, after, dead
-        Room for as many labels: time, energy, the next label at the node, and whether another beats it.
+    used_t, used_e, after, dead, parity
+        Room for as many labels: time, energy, the next label at the node, whether another beats it, and the
+        cuts in which an odd number of targets is visited.
     """
     n = len(prize)
     words = mask.shape[1]
@@ -147,6 +164,7 @@ def best_routes(
     node[0], parent[0], profit[0] = n, -1, 0.0
     used_t[0] = used_e[0] = 0.0
     dead[0] = False
+    parity[0] = np.uint64(0)
     for w in range(words):
         mask[0, w] = np.uint64(0)
     for j in range(n):
@@ -172,7 +190,9 @@ def best_routes(
                     continue
                 if metric and (t + time_s[j, n + 1] > time_limit or e + energy_j[j, n + 1] > energy_limit):
                     continue
-                p = profit[label] + gain[i, j]
+                charged = parity[label] & in_cuts[j]
+                p = profit[label] + gain[i, j] - _charge(charged, penalty)
+                odd = parity[label] ^ in_cuts[j]
                 for w in range(words):
                     mask[count, w] = (mask[label, w] & memory[j, w]) | mask[0, w]
                 mask[count, j >> 6] |= one << np.uint64(j & 63)
@@ -210,6 +230,8 @@ def best_routes(
                                 beaten = False
                             if mode == ENUMERATE and mask[other, w] != mask[count, w]:
                                 beaten = False
+                        if beaten and mode == EXACT and parity[other] & ~odd:
+                            beaten = profit[other] - _charge(parity[other] & ~odd, penalty) >= p - 1e-12
                         if beaten:
                             break
                     if used_t[other] >= t and used_e[other] >= e and profit[other] <= p:
@@ -219,6 +241,8 @@ def best_routes(
                                 worse = False
                             if mode == ENUMERATE and mask[other, w] != mask[count, w]:
                                 worse = False
+                        if worse and mode == EXACT and odd & ~parity[other]:
+                            worse = p - _charge(odd & ~parity[other], penalty) >= profit[other]
                         if worse:
                             dead[other] = True
                             final[other] = -np.inf
@@ -231,6 +255,7 @@ def best_routes(
                 fits = t + time_s[j, n + 1] <= time_limit and e + energy_j[j, n + 1] <= energy_limit
                 final[count] = p + gain[j, n + 1] if fits else -np.inf
                 dead[count] = False
+                parity[count] = odd
                 after[count] = head[j]
                 head[j] = count
                 count += 1

@@ -8,6 +8,8 @@ HiGHS minimises, so stage 1 minimises ``-value``. A column of large cost stands 
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import highspy
@@ -16,6 +18,8 @@ from numpy.typing import NDArray
 
 from react_opt.models.inspection import FloatArray, InspectionArrays
 
+CUTS_PER_ROUND = 20
+LEAST_VIOLATION = 0.02
 STAND_IN = 1e7  # relative to the largest coefficient
 
 
@@ -45,6 +49,8 @@ class Duals:
         Value of the linear program, minimised.
     stand_in
         Routes that stand-ins take.
+    cuts
+        Reduced cost of each subset-row cut, <= 0.
     """
 
     target: FloatArray
@@ -52,6 +58,7 @@ class Duals:
     value: float
     objective: float
     stand_in: float
+    cuts: FloatArray
 
 
 class Master:
@@ -69,6 +76,7 @@ class Master:
         self.arrays, self.sizes = arrays, sizes
         self.columns: list[Column] = []
         self.least_value: float | None = None
+        self.cuts: list[tuple[int, int, int]] = []
         self._known: set[tuple[int, tuple[int, ...]]] = set()
         self._n = len(arrays.value)
         self._solver = quiet()
@@ -91,11 +99,36 @@ class Master:
                 self._known.add(key)
                 new.append(column)
         if new:
-            cost, start, index, value = matrix_of(new, self._n, len(self.sizes), self.least_value is not None)
+            cost, start, index, value = matrix_of(
+                new, self._n, len(self.sizes), self.least_value is not None, self.cuts
+            )
             m = len(new)
             self._solver.addCols(m, cost, np.zeros(m), np.full(m, highspy.kHighsInf), len(index), start, index, value)
             self.columns += new
         return len(new)
+
+    def cut(self, most: int) -> int:
+        """Add the subset-row cuts that the last solution breaks most; return how many.
+
+        Of any three targets, routes through two of them can be chosen once (Jepsen et al. 2008).
+
+        Parameters
+        ----------
+        most
+            Cuts to have at most.
+        """
+        used = np.flatnonzero(self.x > 1e-9)
+        visits = np.zeros((self._n, len(used)), np.bool_)
+        for at, p in enumerate(used.tolist()):
+            visits[list(self.columns[p].stops), at] = True
+        found = broken_triples(visits, self.x[used], min(CUTS_PER_ROUND, most - len(self.cuts)))
+        for triple in found:
+            inside = set(triple)
+            index = [p for p, column in enumerate(self.columns) if len(inside.intersection(column.stops)) >= 2]
+            self.cuts.append(triple)
+            columns = np.array(index, np.int32) + np.int32(len(self.sizes))
+            self._solver.addRow(-highspy.kHighsInf, 1.0, len(index), columns, np.ones(len(index)))
+        return len(found)
 
     def second_stage(self, least_value: float) -> None:
         """Minimise the second objective over plans of at least this value."""
@@ -120,7 +153,29 @@ class Master:
         worth = 1.0 if self.least_value is None else max(0.0, float(dual[n + groups]))
         objective = float(self._solver.getInfo().objective_function_value)
         stand_in = float(np.array(solution.col_value)[:groups].sum())
-        return Duals(np.minimum(dual[:n], 0.0), dual[n : n + groups], worth, objective, stand_in)
+        cuts = np.minimum(dual[n + groups + 1 :], 0.0)
+        return Duals(np.minimum(dual[:n], 0.0), dual[n : n + groups], worth, objective, stand_in, cuts)
+
+
+def broken_triples(visits: NDArray[np.bool_], x: FloatArray, most: int) -> list[tuple[int, int, int]]:
+    """Return the triples of targets whose subset-row cut is broken most, worst first.
+
+    Parameters
+    ----------
+    visits, x
+        ``(N, m)`` which targets the routes in use visit, and ``(m,)`` how much of each route is used.
+    most
+        Triples at most.
+    """
+    busy = np.flatnonzero(visits @ x > 1e-6)
+    if len(busy) < 3 or most <= 0:
+        return []
+    triples = np.array(list(itertools.combinations(busy.tolist(), 3)), dtype=np.int64)
+    part = visits.astype(np.int8)
+    twice = part[triples[:, 0]] + part[triples[:, 1]] + part[triples[:, 2]] >= 2
+    violation = twice @ x - 1.0
+    worst = np.argsort(-violation, kind="stable")[:most]
+    return [(int(a), int(b), int(c)) for a, b, c in triples[worst[violation[worst] > LEAST_VIOLATION]]]
 
 
 def quiet() -> highspy.Highs:
@@ -134,7 +189,7 @@ def quiet() -> highspy.Highs:
 
 
 def matrix_of(
-    columns: list[Column], n: int, groups: int, second: bool
+    columns: list[Column], n: int, groups: int, second: bool, cuts: Sequence[tuple[int, int, int]] = ()
 ) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.int32], FloatArray]:
     """Return costs, and the columns of the matrix by starts, rows and values."""
     cost = np.array([column.cost if second else -column.value for column in columns])
@@ -146,6 +201,7 @@ def matrix_of(
         seen: dict[int, float] = {}
         for k in column.stops:
             seen[k] = seen.get(k, 0.0) + 1.0
-        index += [*seen, n + column.group, n + groups]
-        value += [*seen.values(), 1.0, column.value]
+        hit = [n + groups + 1 + q for q, cut in enumerate(cuts) if sum(k in seen for k in cut) >= 2]
+        index += [*seen, n + column.group, n + groups, *hit]
+        value += [*seen.values(), 1.0, column.value, *(1.0 for _ in hit)]
     return cost, np.array(start, np.int32), np.array(index, np.int32), np.array(value, np.float64)

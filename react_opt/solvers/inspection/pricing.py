@@ -40,6 +40,22 @@ def is_metric(time_s: FloatArray, energy_j: FloatArray) -> bool:
 
 
 @dataclass(frozen=True)
+class Cuts:
+    """Subset-row cuts as the pricing sees them.
+
+    Parameters
+    ----------
+    bits
+        ``(N,)`` bits of the cuts that each target is in.
+    penalty
+        ``(64,)`` price of each cut.
+    """
+
+    bits: NDArray[np.uint64]
+    penalty: FloatArray
+
+
+@dataclass(frozen=True)
 class Priced:
     """What one pricing found.
 
@@ -108,6 +124,7 @@ class Pricer:
         most: int,
         count: int,
         stop: NDArray[np.uint8],
+        cuts: Cuts | None = None,
     ) -> Priced:
         """Return routes whose profit exceeds a threshold.
 
@@ -125,16 +142,19 @@ class Pricer:
             Columns at most.
         stop
             ``(1,)`` set to nonzero by another thread to end early.
+        cuts
+            Subset-row cuts with their prices; None for none.
         """
         n = self.n
         if self.metric and mode in (HEURISTIC, EXACT):
             prize = np.where(prize > WORTH_NOTHING, prize, -np.inf)
         memory = self.memory if mode == EXACT else self.everything
+        charges = (np.zeros(n, np.uint64), np.zeros(64)) if cuts is None else (cuts.bits, cuts.penalty)
         while True:
             room = self._room
             made = best_routes(
                 prize, rate, self.cost, self.time_s, self.energy_j, self.arrays.time_limit_s, self.energy_limit,
-                memory, self.metric, threshold, mode, *self.buckets, stop, *room,
+                memory, self.metric, threshold, mode, *self.buckets, *charges, stop, *room,
             )  # fmt: skip
             if made >= 0 or stop[0] != 0 or len(room[0]) >= most:
                 break
@@ -181,7 +201,7 @@ def _labels(most: int, words: int) -> tuple[NDArray[Any], ...]:
     return (
         np.empty(most, whole), np.empty(most, whole), np.empty(most, real), np.empty((most, words), np.uint64),
         np.empty(most, real), np.empty(most, real), np.empty(most, real), np.empty(most, whole),
-        np.empty(most, np.bool_),
+        np.empty(most, np.bool_), np.empty(most, np.uint64),
     )  # fmt: skip
 
 
