@@ -24,11 +24,13 @@ from react_opt.solvers.routes.pricing import RoutePricer, route_column
 from react_opt.solvers.routes.rows import violated_limits
 from react_opt.solvers.routes.search import improve
 from react_opt.solvers.routes.selection import select
+from react_opt.solvers.routes.subgradient import DualAscent
 
 FIRST_MEMORY = 8
 MOST_CUTS = 64
 EASY_ROUTES = 3_000
 MOST_ROUTES = 30_000
+MANY_CELLS = 150
 PRIMAL_SHARE = 0.05
 FIRST_SEARCH_S = 0.004  # per cell
 FIRST_SEARCH_WORK = 20
@@ -164,6 +166,12 @@ class _Proof:
                 wait_s = min(wait_s, 0.05 * max(0.0, budget.deadline - budget.begun))
             self._improve_until(time.perf_counter() + wait_s, FIRST_SEARCH_WORK)
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
+        ascent = DualAscent(self.generation)
+        ascent.uniform(float(self.problem.reward.max(initial=0.0)))
+        if self.problem.n_cells > MANY_CELLS:
+            self._keep_certificate()
+            ascent.volume(lambda: False)
+        self._keep_certificate()
         while not self.standing.done():
             self._forget_columns()
             solved = self.generation.converge(at_root=True)
