@@ -45,6 +45,8 @@ def _state(robots: int, n_cells: int) -> State:
         np.zeros(n_cells, dtype=np.int32),
         np.zeros((robots, n_cells + 1)),
         np.zeros((robots, n_cells + 1)),
+        np.zeros(robots),
+        np.zeros(robots),
     )
 
 
@@ -110,6 +112,9 @@ def _insert(cell: int, s: State, tables: Tables, loss: FloatArray, random: Rando
             else:
                 added = energy_j[at, cell] - (then - t) * wait_j
             gain -= sigma * added
+            over = added + sense_j - s.slack_j[r]
+            if over > 0.0:  # cells at the end will have to go
+                gain -= s.joule[r] * over
             if gain > best and draw(random) >= _BLINK:
                 best, best_r, best_k = gain, r, k
     if best_r >= 0:

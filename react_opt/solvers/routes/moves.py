@@ -41,7 +41,8 @@ class State(NamedTuple):
     ``order`` (n_robots, n_cells) and ``lengths`` are the sequences, ``arrival`` their instants, ``values`` what each
     is worth; ``owner`` and ``position`` say where each cell is (owner -1: nowhere, -2: in hand). ``slope`` and
     ``moment`` (n_robots, n_cells + 1) are sums over the positions before k of what one step of delay costs, and of
-    that times the arrival.
+    that times the arrival. ``slack_j`` is the battery a robot does not need, ``joule`` what its last cell earns per
+    joule: the worth of a joule where the battery binds.
     """
 
     order: Order
@@ -52,6 +53,8 @@ class State(NamedTuple):
     position: Order
     slope: FloatArray
     moment: FloatArray
+    slack_j: FloatArray
+    joule: FloatArray
 
 
 @inner
@@ -78,6 +81,7 @@ def read(r: int, s: State, tables: Tables) -> None:
     spare_j, wait_j, sense_j = tables.joules[r, 0], tables.joules[r, 1], tables.joules[r, 2]
     order, arrival, slope, moment = s.order[r], s.arrival[r], s.slope[r], s.moment[r]
     spent, value, kept = 0.0, 0.0, 0
+    s.joule[r] = 0.0
     slope[0], moment[0] = 0.0, 0.0
     for k in range(s.lengths[r]):
         cell = order[k]
@@ -110,6 +114,8 @@ def read(r: int, s: State, tables: Tables) -> None:
             decay -= reward[cell, then + 1]
         slope[kept] = slope[kept - 1] + decay
         moment[kept] = moment[kept - 1] + decay * then
+        if after > spent:
+            s.joule[r] = earned / (after - spent)
         spent, at, t = after, cell, then
     s.lengths[r] = kept
     rest = horizon - t
@@ -117,6 +123,7 @@ def read(r: int, s: State, tables: Tables) -> None:
         spent += energy_j[at, back]
         rest -= steps[at, back]
     s.values[r] = value - sigma * (spent + rest * wait_j)
+    s.slack_j[r] = spare_j - spent - rest * wait_j
 
 
 @inner

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from react_opt.solvers.routes.anneal import anneal
-from react_opt.solvers.routes.beam import affordable_width, best_response
+from react_opt.solvers.routes.beam import affordable_width, battery_can_bind, best_response
 from react_opt.solvers.routes.greedy import route_classes
 from react_opt.solvers.routes.moves import Tables
 from react_opt.solvers.routes.problem import FloatArray, Route, RouteProblem
@@ -17,7 +17,7 @@ from react_opt.solvers.routes.sequences import SequenceModel, applies, decode, e
 
 _DEFAULT_WORK = 100
 _MOST_CELLS = 6000  # above this the square table of fastest ways is not built
-_HOT, _COLD = 0.2, 0.02  # temperatures as shares of what a cell earns at best, on average
+_HOT, _COLD = 0.1, 0.02  # temperatures as shares of what a cell earns at best, on average
 _FIRST_CYCLE = 4  # annealing chunks of the first cycle; every cycle is four times as long as the one before
 _WIDTHS = (64, 256, 1024)
 _EXPANSIONS = 400_000  # labels times arcs that one best response may look at, some tenths of a second
@@ -163,6 +163,8 @@ def _anneal(search: _Search, model: SequenceModel, cycle: int) -> None:
     """One cycle of annealing from the best plan, hot first and milder in later cycles."""
     problem = search.problem
     ruin_share = min(0.06, max(0.001, 1.5 / problem.n_cells))  # one costs as much as many segment moves
+    if any(battery_can_bind(problem, group) for group in problem.classes):
+        ruin_share = max(ruin_share, 0.02)  # segment moves do not see what they cost in battery
     moves = min(10_000, int(100.0 / ruin_share))
     order, lengths = encode(problem, search.routes)
     best_order, best_lengths = order.copy(), lengths.copy()
