@@ -1,0 +1,198 @@
+"""The middle layer's table: latencies of assignments and inspections, and PyVRP beside the large inspections.
+
+    python benchmarks/middle_layer.py [--seed 0] [--large 30] [--large-s 10] [--only NAME]
+
+Prints one line per row: what, how many, median, 99th percentile and largest wall time, and what was proven.
+Run it on an idle machine; latencies are of a warm process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from react_opt import jsonio
+from react_opt.models.assignment import AssignmentArrays, pair_values
+from react_opt.models.inspection import InspectionArrays, Routes, build
+from react_opt.options import SolveOptions
+from react_opt.solvers.assignment.exact import linear_assignment, solve_arrays
+from react_opt.solvers.inspection import solve_inspection
+
+SPEED_M_S, MOVING_W, SERVICE_S, SERVICE_J = 0.89, 26.0, 5.0, 130.0
+
+
+def assignment_case(rng: Any, robots: int, targets: int, conflicts: int, capacity: int) -> AssignmentArrays:
+    """Robots and targets on a floor of 20 m x 50 m, detours of up to half, Jackal batteries partly empty."""
+    size = np.array([20.0, 50.0])
+    at, to = rng.uniform(0, size, (robots, 2)), rng.uniform(0, size, (targets, 2))
+    length = np.linalg.norm(at[:, None] - to[None], axis=2) * rng.uniform(1, 1.5, (robots, targets))
+    time_s = length / SPEED_M_S
+    energy_j = time_s * MOVING_W
+    battery = rng.uniform(0.2, 1.0, robots) * 8245.96
+    budget = 0.9 * battery
+    gain = rng.uniform(1, 10, targets)
+    value = pair_values(gain, time_s, energy_j, battery, budget, alpha=1.0, beta=2.0, time_ref_s=20.0)
+    pairs = np.sort(rng.choice(targets, (conflicts, 2)), axis=1)
+    pairs = np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
+    limit = rng.integers(1, capacity + 1, robots)
+    return AssignmentArrays(value, np.where(np.isneginf(value), 0.0, energy_j), budget, limit, pairs)
+
+
+def inspection_case(robots: int, targets: int, seed: int) -> Any:
+    """Targets on a floor of 20 m x 50 m, robots where they last were, an exit; time for about two thirds of them."""
+    rng = np.random.default_rng([seed, robots, targets])
+    names = [*(f"k{i}" for i in range(targets)), *(f"s{r}" for r in range(robots)), "exit"]
+    xy = rng.uniform(0, [20.0, 50.0], (len(names), 2))
+    time_s = np.linalg.norm(xy[:, None] - xy[None], axis=2) / SPEED_M_S
+    per_robot = 0.7124 * np.sqrt(targets * 1000.0) / robots / SPEED_M_S + targets * SERVICE_S / robots
+    left_s = float(round(0.65 * per_robot + 20.0, 1))
+    return jsonio.parse(
+        {
+            "kind": "inspection", "name": f"{robots} x {targets}, seed {seed}", "time_left_s": left_s,
+            "robots": [
+                {"id": f"r{r}", "at": f"s{r}", "end": "exit", "battery_j": float(rng.uniform(0.8, 1.6) * left_s * MOVING_W)}
+                for r in range(robots)
+            ],
+            "targets": [
+                {"id": f"k{i}", "value": float(rng.integers(1, 11)), "service_s": SERVICE_S, "service_energy_j": SERVICE_J}
+                for i in range(targets)
+            ],
+            "travel": [
+                {"from": a, "to": b, "time_s": float(time_s[i, j]), "energy_j": MOVING_W * float(time_s[i, j])}
+                for i, a in enumerate(names) for j, b in enumerate(names) if i != j
+            ],
+        }
+    )  # fmt: skip
+
+
+def pyvrp_routes(arrays: InspectionArrays, seconds: float, seed: int) -> Routes:
+    """Solve the same prize-collecting problem with PyVRP: prizes far above durations, distance for energy."""
+    import pyvrp
+    from pyvrp.stop import MaxRuntime
+
+    scale, n = 1000, len(arrays.value)
+    model = pyvrp.Model()
+    places = [model.add_location(0, 0) for _ in range(n + 2 * len(arrays.time_s))]
+    for i, value in enumerate(arrays.value.tolist()):
+        model.add_client(places[i], prize=round(value * 10_000_000), required=False)
+    for r, limit_j in enumerate(arrays.energy_limit_j.tolist()):
+        profile = model.add_profile()
+        start, end = places[n + 2 * r], places[n + 2 * r + 1]
+        model.add_vehicle_type(
+            1, start_depot=model.add_depot(start), end_depot=model.add_depot(end),
+            shift_duration=int(arrays.time_limit_s * scale), max_distance=int(limit_j * scale),
+            unit_distance_cost=0, unit_duration_cost=1, profile=profile,
+        )  # fmt: skip
+        nodes = [*places[:n], start, end]
+        for i in range(n + 1):
+            for j in [*range(n), n + 1]:
+                if i != j:
+                    energy, duration = arrays.energy_j[r, i, j], arrays.time_s[r, i, j]
+                    model.add_edge(
+                        nodes[i], nodes[j], int(np.ceil(energy * scale)), int(np.ceil(duration * scale)), profile
+                    )
+    best = model.solve(MaxRuntime(seconds), seed=seed, display=False, collect_stats=False).best
+    routes: Routes = [[] for _ in arrays.time_s]
+    for route in best.routes():
+        routes[route.vehicle_type()] = [stop.idx for stop in route if stop.is_client()]
+    return routes
+
+
+def timed(name: str, runs: int, once: Callable[[int], str]) -> None:
+    """Run a row and print its line."""
+    once(-1)  # warm
+    walls, proven = [], 0
+    for run in range(runs):
+        begun = time.perf_counter()
+        proven += once(run) == "optimal"
+        walls.append(1000 * (time.perf_counter() - begun))
+    print(
+        f"{name:48s} runs {runs:4d}  median {np.median(walls):8.2f} ms  p99 {np.quantile(walls, 0.99):8.2f} ms"
+        f"  max {max(walls):8.2f} ms  proven {proven}",
+        flush=True,
+    )
+
+
+def assignments(seed: int) -> None:
+    for name, runs, shape in (
+        ("assignment 4 x 20, 15 conflicts", 500, (4, 20, 15, 1)),
+        ("assignment 20 x 100, 60 conflicts, capacity 1-3", 100, (20, 100, 60, 3)),
+    ):
+        rng = np.random.default_rng(seed)
+        cases = [assignment_case(rng, *shape) for _ in range(runs + 1)]
+
+        def once(run: int, cases: list[AssignmentArrays] = cases) -> str:
+            return "optimal" if solve_arrays(cases[run]).limit == "none" else "feasible"
+
+        timed(name, runs, once)
+
+
+def plain(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    value = assignment_case(rng, 1000, 1000, 0, 1).value
+    gain = np.maximum(value, 0.0)
+    for name, solve in (
+        ("plain assignment 1000 x 1000", linear_assignment),
+        ("  scipy alone on the same values", lambda _: linear_sum_assignment(gain, maximize=True)),
+    ):
+
+        def once(run: int, solve: Any = solve) -> str:
+            solve(value)
+            return "optimal"
+
+        timed(name, 7, once)
+
+
+def inspections(seed: int) -> None:
+    for robots, targets, runs in ((3, 15, 100), (4, 30, 20)):
+        cases = [inspection_case(robots, targets, seed + run) for run in range(runs + 1)]
+
+        def once(run: int, cases: list[Any] = cases) -> str:
+            status: str = solve_inspection(cases[run], SolveOptions(explain=False)).claim.status
+            return status
+
+        timed(f"inspection {robots} robots, {targets} targets", runs, once)
+
+
+def large(seed: int, runs: int, seconds: float) -> None:
+    ours, theirs, gaps = [], [], []
+    for run in range(runs):
+        instance = inspection_case(4, 100, seed + run)
+        arrays = build(instance).arrays
+        plan = solve_inspection(instance, SolveOptions(time_limit_s=seconds, explain=False, seed=seed))
+        routes = pyvrp_routes(arrays, seconds, seed)
+        assert arrays.is_feasible(routes)
+        ours.append((plan.claim.objective or 0.0, plan.claim.secondary.objective if plan.claim.secondary else None))
+        theirs.append(arrays.worth(routes))
+        gaps.append(plan.claim.gap if plan.claim.gap is not None else np.nan)
+        print(f"  run {run}: react_opt {ours[-1]}  bound {plan.claim.bound}  PyVRP {theirs[-1]}", flush=True)
+    value = np.mean([row[0] for row in ours]), np.mean([row[0] for row in theirs])
+    print(f"inspection 4 robots, 100 targets, {seconds:g} s: mean value {value[0]:.2f}, PyVRP {value[1]:.2f}, "
+          f"mean gap {np.mean(gaps):.4f}", flush=True)  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--large", type=int, default=30, help="runs of 4 robots and 100 targets")
+    parser.add_argument("--large-s", type=float, default=10.0, help="seconds for each of them")
+    parser.add_argument("--only", choices=("assignments", "plain", "inspections", "large"))
+    options = parser.parse_args()
+    rows = {
+        "assignments": lambda: assignments(options.seed),
+        "plain": lambda: plain(options.seed),
+        "inspections": lambda: inspections(options.seed),
+        "large": lambda: large(options.seed, options.large, options.large_s),
+    }
+    for name, row in rows.items():
+        if options.only in (None, name):
+            row()
+
+
+if __name__ == "__main__":
+    main()
