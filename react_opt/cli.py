@@ -52,13 +52,24 @@ def main() -> NoReturn:
     except (KeyboardInterrupt, typer.Abort):
         print("interrupted", file=sys.stderr)
         code = INTERRUPTED
+    except SystemError as error:  # what a compiled kernel makes of an interrupt
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        print("interrupted", file=sys.stderr)
+        code = INTERRUPTED
     except MemoryError:
         print("react-opt: out of memory; nothing was written", file=sys.stderr)
         code = NO_PLAN
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = OK
-    sys.exit(code if isinstance(code, int) else OK)
+    code = code if isinstance(code, int) else OK
+    watching = sys.modules.get("react_opt.solvers.watch")
+    if watching is not None and watching.left_behind():  # the deadline holds for a solver that does not stop, too
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 @app.callback(invoke_without_command=True)

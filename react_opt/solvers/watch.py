@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,6 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+_EXIT_GRACE_S = 5.0
+_stray: list[threading.Thread] = []
+
+
+def leave_behind(thread: threading.Thread) -> None:
+    """Remember a thread whose solver does not stop; the interpreter gives it some seconds to end before it exits."""
+    if not _stray:
+        atexit.register(_join_stray)  # native code that outlives the interpreter aborts the process
+    _stray[:] = [other for other in _stray if other.is_alive()] + [thread]
+
+
+def left_behind() -> bool:
+    """Whether a solver that was left behind still runs; a command may then end by ``os._exit`` and not wait for it."""
+    return any(thread.is_alive() for thread in _stray)
+
+
+def _join_stray() -> None:
+    deadline = perf_counter() + _EXIT_GRACE_S
+    for thread in _stray:
+        thread.join(max(0.0, deadline - perf_counter()))
 
 
 @dataclass

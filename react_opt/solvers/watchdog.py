@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import threading
 from collections.abc import Callable
 from time import perf_counter
@@ -14,13 +13,11 @@ from react_opt.errors import UsageError
 from react_opt.models.program import Program
 from react_opt.solvers.outcome import Claim, Limit, Outcome, Request
 from react_opt.solvers.verdict import conclude
-from react_opt.solvers.watch import Watch
+from react_opt.solvers.watch import Watch, leave_behind
 
 _POLL_S = 0.02
 _PROGRESS_S = 0.1
 _INTERRUPT_GRACE_S = 1.0
-_EXIT_GRACE_S = 5.0
-_stray: list[threading.Thread] = []
 
 
 def supervise(
@@ -101,10 +98,10 @@ def _in_thread(watch: Watch, request: Request, started: float, run: Callable[[Wa
             watch.stop("interrupt")
         except BaseException:
             watch.stop("interrupt")
-            _leave(thread)
+            leave_behind(thread)
             raise
     if not answer:
-        _leave(thread)
+        leave_behind(thread)
         return Claim("no_solution", notes=["the solver had not stopped in time and was left behind"])
     if isinstance(answer[0], BaseException):
         raise answer[0]
@@ -130,16 +127,3 @@ def _wait(watch: Watch, request: Request, started: float, done: threading.Event)
             if state != shown or now - reported >= _PROGRESS_S:
                 reported, shown = now, state
                 request.on_progress(now - started, *state)
-
-
-def _leave(thread: threading.Thread) -> None:
-    """Remember a thread that is still running: native code must not outlive the interpreter if it can be helped."""
-    if not _stray:
-        atexit.register(_join_stray)
-    _stray[:] = [other for other in _stray if other.is_alive()] + [thread]
-
-
-def _join_stray() -> None:
-    deadline = perf_counter() + _EXIT_GRACE_S
-    for thread in _stray:
-        thread.join(max(0.0, deadline - perf_counter()))
