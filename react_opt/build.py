@@ -9,7 +9,7 @@ Travel arcs
     Between the standing points of neighbouring areas (left, right, up, down: areas that share only a corner
     share no passage), by a path that stays within the two areas. A wall between them means no arc, however near
     the other side is. Only where this would cut a cell off though the robots can reach it (a wall divides an
-    area), two areas that share a crossing are joined by a path over the whole map, and a note says so.
+    area), two areas that share a crossing are joined by a path through those around, and a note says so.
 Steps and joules
     Time by the speed law, rounded up to whole steps; energy of driving, turning and, for the rest of the last
     step, of standing. Sensing is not in it. Speed modes are the fastest path, which keeps away from walls, and

@@ -83,15 +83,25 @@ class Passages:
                 yield from self._both_ways(self._planners(window), one, other)
             elif self.grid.touches(*one, *other):
                 divided.append((one, other))
-        lengths = [
-            (float(self._whole[0][0].cost_table(np.stack((self.standing[a], self.standing[b]))).length_m[0, 1]), a, b)
-            for a, b in divided
-            if not together.connected(a, b)
-        ]
-        for _, one, other in sorted(lengths):
+        ways = []
+        for one, other in divided:
+            if not together.connected(one, other):
+                planners = self._planners(self._around(one, other))
+                table = planners[0][0].cost_table(np.stack((self.standing[one], self.standing[other])))
+                ways.append((float(table.length_m[0, 1]), one, other, planners))
+        for _, one, other, planners in sorted(ways, key=lambda way: way[:3]):
             if together.merge(one, other):
                 self.detours.append((one, other))
-                yield from self._both_ways(self._whole, one, other)
+                yield from self._both_ways(planners, one, other)
+
+    def _around(self, one: Area, other: Area) -> FreeSpace:
+        """Return the window of two areas and those around them if they are connected in it, else the whole map."""
+        columns, rows = self.grid.shape
+        low = max(0, one[0] - 1), max(0, one[1] - 1)
+        high = min(columns - 1, other[0] + 1), min(rows - 1, other[1] + 1)
+        window = cut(self.grid.space, self.grid.window(*low, *high))
+        ends = np.stack((self.standing[one], self.standing[other]))
+        return window if np.ptp(window.regions_at(ends)) == 0 else self.grid.space
 
     def _neighbours(self) -> Iterator[tuple[Area, Area]]:
         for a, b in sorted(self.standing):
@@ -114,7 +124,7 @@ class Passages:
 
     @cached_property
     def _whole(self) -> Planners:
-        """The planners of the whole map, for what a window of two areas cannot answer."""
+        """The planners of the whole map, for start poses that a window of two areas cannot answer."""
         return self._planners(self.grid.space)
 
     def _both_ways(self, planners: Planners, one: Area, other: Area) -> Iterator[tuple[Area, Area, Mode]]:
