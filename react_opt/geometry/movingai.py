@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from react_opt.errors import Fault, InputError, UsageError
-from react_opt.geometry.atomic import write_whole
 from react_opt.geometry.occupancy import FREE, MAX_PIXELS, OCCUPIED, UNKNOWN, OccupancyMap
+from react_opt.jsonio import write_bytes
 
 _PASSABLE = ".GS"
 _BLOCKED = "@OTW"
@@ -116,4 +116,4 @@ def write_movingai_map(
     letters = np.where(blocked, ord("@"), ord(".")).astype(np.uint8)[::-1]
     rows = b"".join(row.tobytes() + b"\n" for row in letters)
     head = f"type octile\nheight {map_.rows}\nwidth {map_.cols}\nmap\n"
-    write_whole(Path(path), head.encode() + rows)
+    write_bytes(head.encode() + rows, path)

@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from react_opt.errors import Fault, InputError, UsageError
-from react_opt.geometry.atomic import write_whole
 from react_opt.geometry.occupancy import FREE, MAX_PIXELS, OCCUPIED, UNKNOWN, OccupancyMap
+from react_opt.jsonio import write_bytes
 
 Mode = Literal["trinary", "scale", "raw"]
 _MODES = ("trinary", "scale", "raw")
@@ -148,8 +148,8 @@ def write_ros_map(
         "occupied_thresh: 0.65",
         "free_thresh: 0.196",
     ]
-    write_whole(picture, buffer.getvalue())
-    write_whole(path, ("\n".join(lines) + "\n").encode())
+    write_bytes(buffer.getvalue(), picture)
+    write_bytes(("\n".join(lines) + "\n").encode(), path)
 
 
 def _read_header(path: Path) -> _Header:
