@@ -25,6 +25,8 @@ Area = tuple[int, int]
 _ROUNDING = 1e-9  # of a step: a drive of two steps but for rounding takes two
 _SAMPLES_PER_M2 = 2.0  # of OMPL's roadmap: random milestones, 64 to 2000 of them
 
+_AROUND = 3  # areas on each side in which a detour is looked for first: searches of a large map take long
+
 
 class Mode(NamedTuple):
     """One way to drive an arc: whole steps, J without sensing, and the mean speed, m/s."""
@@ -97,8 +99,8 @@ class Passages:
     def _around(self, one: Area, other: Area) -> FreeSpace:
         """Return the window of two areas and those around them if they are connected in it, else the whole map."""
         columns, rows = self.grid.shape
-        low = max(0, one[0] - 1), max(0, one[1] - 1)
-        high = min(columns - 1, other[0] + 1), min(rows - 1, other[1] + 1)
+        low = max(0, one[0] - _AROUND), max(0, one[1] - _AROUND)
+        high = min(columns - 1, other[0] + _AROUND), min(rows - 1, other[1] + _AROUND)
         window = cut(self.grid.space, self.grid.window(*low, *high))
         ends = np.stack((self.standing[one], self.standing[other]))
         return window if np.ptp(window.regions_at(ends)) == 0 else self.grid.space
