@@ -12,9 +12,7 @@ from react_opt.solvers.ortools_ import imported
 from react_opt.solvers.outcome import Claim, Request
 from react_opt.solvers.watch import Watch
 
-ABILITIES = Abilities(
-    warm_start=True, bound=True, incumbents=True, work_unit="thousandths of deterministic time", integer_only=True
-)
+ABILITIES = Abilities(warm_start=True, bound=True, incumbents=True, work_unit="deterministic ms", integer_only=True)
 _WORK_UNITS = 1000
 
 

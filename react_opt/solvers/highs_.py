@@ -35,7 +35,7 @@ class HighsBackend:
         warm_start=True,
         bound=True,
         incumbents=True,
-        work_unit="branch-and-bound nodes (simplex iterations where nothing is integer)",
+        work_unit="nodes (simplex iterations in an LP)",
     )
 
     @property

@@ -14,7 +14,7 @@ from react_opt.solvers.backend import Abilities
 from react_opt.solvers.outcome import Claim, Limit, Request
 from react_opt.solvers.watch import Watch
 
-ABILITIES = Abilities(warm_start=True, bound=True, incumbents=True, work_unit="branch-and-bound nodes")
+ABILITIES = Abilities(warm_start=True, bound=True, incumbents=True, work_unit="nodes")
 _TOLERANCE = 1e-9
 _LIMITS: dict[str, Limit] = {"TIME": "time", "NODE": "work", "ITERATION": "work", "MEMORY": "memory"}
 
