@@ -198,3 +198,9 @@ def test_start_is_never_made_worse_by_any_limit(seed):
     if best.robots:
         again = solve(instance, start=best, time_limit_s=0.0, threads=1)
         assert again.objective.total >= best.objective.total - 1e-12
+
+
+def test_nothing_to_explore_and_nobody_to_send():
+    plan = solve(star(cells=[], travel=[], robots=[]))
+    assert plan.claim.status == "optimal"
+    assert plan.claim.objective == 0

@@ -123,7 +123,7 @@ def greedy(problem: RouteProblem, deadline: float | None = None, seed: int = 0) 
     waiting = list(range(len(classes)))
     prices: FloatArray | None = None
     usual = affordable_width(problem, _WIDTH, _EXPANSIONS)
-    size = problem.n_cells * max(1, problem.horizon)
+    size = max(1, problem.n_cells) * max(1, problem.horizon)
     limit = len(classes) * max(20, min(_TRIES, 8_000_000 // size))
     for count in range(limit):
         late = deadline is not None and time.perf_counter() > deadline
