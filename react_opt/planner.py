@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from react_opt.errors import InputError, UsageError
 from react_opt.instance import AssignmentInstance, InspectionInstance, Mission, OrosInstance
 from react_opt.options import SolveOptions
 from react_opt.plan import Plan
+from react_opt.solvers.registry import backend
 from react_opt.solvers.warm import warm_up
 
 WARM_S = 0.05  # below this the kernels were ready, and the claim says nothing of it
@@ -79,8 +82,6 @@ def solve(
         raise UsageError("at step: expected together with a plan to start from")
     if at_step is not None and not isinstance(instance, OrosInstance):
         raise UsageError("at step: expected an oros instance")
-    recipe = _recipe_of(instance)  # neither importing nor compiling it counts against the time limit
-    warm_s = warm_up(instance.kind, recipe)
     options = SolveOptions(
         time_limit_s=time_limit_s,
         work_limit=work_limit,
@@ -93,6 +94,11 @@ def solve(
         should_stop=should_stop,
         **({} if threads is None else {"threads": threads}),
     )
+    if solver is not None:
+        backend(solver)  # bad options are refused at once, not after a first use has compiled its kernels
+    recipe = _recipe_of(instance)  # neither importing nor compiling it counts against the time limit
+    warm_s = warm_up(instance.kind, recipe)
+    options = replace(options, begun=time.perf_counter())
     plan = recipe(instance, options, start, at_step) if at_step is not None else recipe(instance, options, start)
     if warm_s < WARM_S:
         return plan

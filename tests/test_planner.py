@@ -204,3 +204,15 @@ def test_nothing_to_explore_and_nobody_to_send():
     plan = solve(star(cells=[], travel=[], robots=[]))
     assert plan.claim.status == "optimal"
     assert plan.claim.objective == 0
+
+
+@pytest.mark.parametrize(
+    "options", [{"time_limit_s": float("nan")}, {"threads": 0}, {"gap": -1.0}, {"method": "magic"}, {"solver": "magic"}]
+)
+def test_bad_options_are_refused_before_anything_is_compiled(options, monkeypatch):
+    def warm_up(kind, recipe):
+        raise AssertionError("kernels were compiled for a call that is refused")
+
+    monkeypatch.setattr("react_opt.planner.warm_up", warm_up)
+    with pytest.raises(UsageError):
+        solve(star(), **options)
