@@ -35,6 +35,7 @@ class Budget:
         self.deadline, self.work_limit, self._should_stop = deadline, work_limit, should_stop
         self.work = 0
         self.limit: Limit = "none"
+        self.aside: Callable[[], None] | None = None  # done whenever the limits are asked for
 
     def spend(self, units: int = 1) -> None:
         """Count work."""
@@ -47,6 +48,8 @@ class Budget:
     def over(self) -> bool:
         """Return whether a limit is reached; the first one reached is kept in ``limit``."""
         if self.limit == "none":
+            if self.aside is not None:
+                self.aside()
             if self._should_stop is not None and self._should_stop():
                 self.limit = "interrupt"
             elif self.work_limit is not None and self.work >= self.work_limit:

@@ -11,6 +11,7 @@ import numpy as np
 
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.highs_model import fresh_scheduler
+from react_opt.solvers.routes.background import beside
 from react_opt.solvers.routes.budget import Budget, Limit, OnProgress, Standing
 from react_opt.solvers.routes.certificate import certificate
 from react_opt.solvers.routes.columns import Column
@@ -134,7 +135,8 @@ def solve_routes(
             return RoutesResult(None, None, None, "infeasible", "none", notes=(first.reason.text,))
     fresh_scheduler()
     search = _Proof(problem, standing, threads, seed)
-    search.run()
+    with beside(standing, threads, seed):
+        search.run()
     return search.result()
 
 
