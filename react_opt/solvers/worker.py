@@ -94,7 +94,7 @@ def run_in_worker(target: str, args: tuple[str, ...], program: Program, request:
     Raises
     ------
     ReactError
-        What the function raised on purpose, or that it failed.
+        What the function raised on purpose; that it failed otherwise is a note of the claim.
     """
     worker = _take(target)
     kept = False
@@ -236,7 +236,9 @@ def _answer(run: Any, program: Program, request: Request, watch: Watch, args: tu
     except MemoryError:
         return "claim", Claim("no_solution", limit="memory")
     except Exception as error:
-        return "raised", ReactError(f"the solver failed: {type(error).__name__}: {error}")
+        # Whatever goes wrong in a library, what it had told by then and the start are still worth having.
+        cause = error.__context__ or error
+        return "claim", Claim("no_solution", notes=[f"the solver failed: {type(cause).__name__}: {cause}"])
     if claim.limit == "none" and watch.reason == "time":
         claim.limit = "time"
     return "claim", claim
