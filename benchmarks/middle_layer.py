@@ -55,12 +55,12 @@ def inspection_case(robots: int, targets: int, seed: int) -> Any:
         {
             "kind": "inspection", "name": f"{robots} x {targets}, seed {seed}", "time_left_s": left_s,
             "robots": [
-                {"id": f"r{r}", "at": f"s{r}", "end": "exit", "battery_j": float(rng.uniform(0.8, 1.6) * left_s * MOVING_W)}
-                for r in range(robots)
+                {"id": f"r{r}", "at": f"s{r}", "end": "exit", "battery_j": float(battery)}
+                for r, battery in enumerate(rng.uniform(0.8, 1.6, robots) * left_s * MOVING_W)
             ],
             "targets": [
-                {"id": f"k{i}", "value": float(rng.integers(1, 11)), "service_s": SERVICE_S, "service_energy_j": SERVICE_J}
-                for i in range(targets)
+                {"id": f"k{i}", "value": float(value), "service_s": SERVICE_S, "service_energy_j": SERVICE_J}
+                for i, value in enumerate(rng.integers(1, 11, targets))
             ],
             "travel": [
                 {"from": a, "to": b, "time_s": float(time_s[i, j]), "energy_j": MOVING_W * float(time_s[i, j])}

@@ -22,11 +22,11 @@ from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
 from react_opt.solvers.inspection.local import Searcher
 from react_opt.solvers.inspection.master import Column, Duals, Master
-from react_opt.solvers.inspection.pricing import Cuts, Pricer, classes_of
+from react_opt.solvers.inspection.pricing import ELEMENTARY_UP_TO, Cuts, Pricer, classes_of
 
 VALUE_TOLERANCE = 1e-7  # relative: plans whose values agree within it are worth the same
 COST_TOLERANCE = 1e-7
-HEURISTIC_LABELS, EXACT_LABELS, ENUMERATED_LABELS = 20_000, 3_000_000, 400_000
+HEURISTIC_LABELS, EXACT_LABELS, ENUMERATED_LABELS = 60_000, 3_000_000, 400_000
 MOST_COLUMNS = 40_000  # of the integer program over enumerated routes
 FEW_LABELS, FEW_COLUMNS = 20_000, 2500  # of an enumeration that is worth trying before cuts
 MOST_CUTS = 60
@@ -37,6 +37,7 @@ PORTION = 2000
 LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing limits the search
 COLUMNS = 30  # added per pricing
 MIP_NODES = 2000  # of an integer program under a work limit
+WARM_S, WARM_SHARE, WARM_PORTIONS = 2.0, 0.2, 8  # of local search before the first linear program
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
 
 
@@ -119,6 +120,7 @@ class Decomposition:
         self.arrays, self.control, self.seed, self.gap, self.on_bound = arrays, control, seed, gap, on_bound
         self.robots, self.sizes, self.group = classes_of(arrays)
         self.pricers = [Pricer(arrays, c, robot) for c, robot in enumerate(self.robots)]
+        self.elementary = len(arrays.value) <= ELEMENTARY_UP_TO
         self.master = Master(arrays, self.sizes)
         self.answer = Answer()
         self.grid = grid_of(arrays.value)
@@ -210,6 +212,12 @@ class Decomposition:
         if self.searcher is not None:
             self.offer(self.searcher.routes)
 
+    def _pool(self) -> None:
+        """Give the linear program the routes that local search has come across."""
+        if self.searcher is not None:
+            seen = sorted(self.searcher.seen.copy())
+            self.master.add([self.pricers[self.group[r]].column(stops) for r, stops in seen])
+
     # --- bounds ---
 
     def _simple_bound(self) -> float:
@@ -277,7 +285,7 @@ class Decomposition:
             self._search(PORTION)
         if done() or self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
             return True
-        while self.pricers[0].elementary and not done() and self.master.cut(MOST_CUTS):
+        while self.elementary and not done() and self.master.cut(MOST_CUTS):
             duals = self._generate(second)
             if duals is None:
                 return done()
@@ -289,6 +297,10 @@ class Decomposition:
         """Price until no route improves the linear program; its duals, None where it was stopped."""
         done = self._cost_proven if second else self._value_proven
         rate = 1.0 if second else 0.0
+        if not self.elementary:
+            self._warm_up()
+            if done():
+                return None
         while not self.control.stopped():
             duals = self.master.solve()
             if duals is None:
@@ -299,7 +311,7 @@ class Decomposition:
             prize = duals.value * self.arrays.value + duals.target
             eps = 1e-7 * max(1.0, abs(duals.objective))
             threshold = [-float(price) + eps for price in duals.group]
-            if not self.pricers[0].elementary and self._price(prize, rate, threshold, HEURISTIC):
+            if not self.elementary and self._price(duals, prize, rate, threshold, second):
                 if self._thread is not None:
                     self._collect()
                 continue
@@ -317,12 +329,27 @@ class Decomposition:
                 return duals
         return None
 
-    def _price(self, prize: FloatArray, rate: float, threshold: list[float], mode: int) -> bool:
-        added = 0
+    def _warm_up(self) -> None:
+        """Let local search run for a while, and begin with the routes that it has come across."""
+        if self._thread is None:
+            for _ in range(WARM_PORTIONS):
+                self._search(PORTION)
+        else:
+            left_s = self.control.left_s()
+            self._thread.join(WARM_S if left_s is None else min(WARM_S, WARM_SHARE * left_s))
+            self._collect()
+        self._pool()
+
+    def _price(self, duals: Duals, prize: FloatArray, rate: float, threshold: list[float], second: bool) -> bool:
+        """Price heuristically; True where routes were found. Bounds by the completion tables on the way."""
+        added, bounds = 0, []
         for pricer, least in zip(self.pricers, threshold, strict=True):
             self.control.work += 1
-            found = pricer.price(prize, rate, least, mode, HEURISTIC_LABELS, COLUMNS, self.control.flag)
+            found = pricer.price(prize, rate, least, HEURISTIC, HEURISTIC_LABELS, COLUMNS, self.control.flag)
             added += self.master.add(found.columns)
+            bounds.append(found.bound)
+        if duals.stand_in < 1e-6 and np.isfinite(bounds).all():
+            self._bound(duals, bounds, second)
         return added > 0
 
     def _price_exactly(

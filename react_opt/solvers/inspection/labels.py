@@ -106,8 +106,8 @@ def _charge(cuts: Any, penalty: Any) -> float:
 def best_routes(
     prize: Any, rate: float, cost: Any, time_s: Any, energy_j: Any, time_limit: float, energy_limit: float,
     memory: Any, metric: bool, threshold: float, mode: int, n_time: int, n_energy: int, in_cuts: Any, penalty: Any,
-    stop: Any, node: Any, parent: Any, profit: Any, mask: Any, final: Any, used_t: Any, used_e: Any, after: Any,
-    dead: Any, parity: Any,
+    beam: int, bound: Any, stop: Any, node: Any, parent: Any, profit: Any, mask: Any, final: Any, used_t: Any,
+    used_e: Any, after: Any, dead: Any, parity: Any,
 ) -> int:  # fmt: skip
     """Extend labels until none is left; fill ``node, parent, profit, mask, final`` and return their number.
 
@@ -143,8 +143,12 @@ def best_routes(
     used_t, used_e, after, dead, parity
         Room for as many labels: time, energy, the next label at the node, whether another beats it, and the
         cuts in which an odd number of targets is visited.
+    beam
+        Labels kept per number of stops in ``HEURISTIC`` mode: those that promise most.
+    bound
+        Out: ``(1,)`` a bound on the profit of any route, from the completion table of time.
     """
-    n = len(prize)
+    n, most = len(prize), len(node)
     words = mask.shape[1]
     gain = np.full((n + 2, n + 2), -np.inf)
     for i in range(n + 2):
@@ -157,8 +161,13 @@ def best_routes(
         t_best, t_first, t_other = completion(prize, gain, time_s, time_limit, n_time)
     if n_energy > 0:
         e_best, e_first, e_other = completion(prize, gain, energy_j, energy_limit, n_energy)
+    bound[0] = np.inf
+    if n_time > 0:
+        bound[0] = t_best[n, 0]
+    if n_energy > 0:
+        bound[0] = min(bound[0], e_best[n, 0])
+    promise = np.empty(most if mode == HEURISTIC else 0)
     t_width, e_width = time_limit / max(1, n_time), energy_limit / max(1, n_energy)
-    most = len(node)
     head = np.full(n + 1, -1, np.int64)
     one = np.uint64(1)
     node[0], parent[0], profit[0] = n, -1, 0.0
@@ -254,6 +263,12 @@ def best_routes(
                 used_t[count], used_e[count] = t, e
                 fits = t + time_s[j, n + 1] <= time_limit and e + energy_j[j, n + 1] <= energy_limit
                 final[count] = p + gain[j, n + 1] if fits else -np.inf
+                if mode == HEURISTIC:
+                    promise[count] = p
+                    if n_time > 0:
+                        promise[count] += _ahead(t_best, t_first, t_other, j, t, t_width, mask, count)
+                    elif n_energy > 0:
+                        promise[count] += _ahead(e_best, e_first, e_other, j, e, e_width, mask, count)
                 dead[count] = False
                 parity[count] = odd
                 after[count] = head[j]
@@ -262,4 +277,9 @@ def best_routes(
                 if count >= most:
                     return -count
         begin = end
+        if mode == HEURISTIC and count - begin > beam:
+            least = np.sort(promise[begin:count])[-beam]
+            for label in range(begin, count):
+                if promise[label] < least:
+                    dead[label] = True
     return count

@@ -19,6 +19,9 @@ from react_opt.models.inspection import InspectionArrays, Routes
 MEAN_REMOVED = 8.0
 LONGEST_STRING = 10.0
 BLINK = 0.01
+RATES = (2.0, 1.0, 0.3, 0.02)
+POOL = 200  # routes remembered per portion
+MOST_SEEN = 3000  # routes remembered in all
 
 
 @dataclass
@@ -50,6 +53,9 @@ class Searcher:
         mean = np.minimum(arrays.cost[:, :n, :n].min(axis=0, initial=np.inf), 1e15)
         self._near = np.argsort(mean + mean.T - 3e15 * np.eye(n), axis=1, kind="stable")
         self._portion = 0
+        self._pool = np.full((POOL, n + 1), -1, dtype=np.int64)
+        self._pool_robot = np.full(POOL, -1, dtype=np.int64)
+        self.seen: set[tuple[int, tuple[int, ...]]] = set()
 
     def _put(self, routes: Routes) -> None:
         self._tour[:] = -1
@@ -75,16 +81,22 @@ class Searcher:
         value, cost = arrays.worth(self.routes)
         mean = float(arrays.value.mean()) if len(arrays.value) else 0.0
         rate = 0.3 * value / cost if value > 0 and cost > 0 else 0.0
-        rate = (1.0, 0.3, 0.02)[self._portion % 3] * rate  # by turns a search for room and one for value
+        rate *= RATES[self._portion % len(RATES)]  # by turns a search for room and one for value
         if value == 0.0:
             rate = 1e-6 * mean
         if iterations > 0 and len(arrays.value):
             search(
                 self._tour, arrays.value, arrays.time_s, arrays.energy_j, arrays.cost, arrays.time_limit_s,
                 arrays.energy_limit_j, self._near, rate, max(1e-9, 0.3 * heat * mean), max(1e-12, 0.002 * mean),
-                iterations, self.seed * 1_000_003 + self._portion, self.stop,
+                iterations, self.seed * 1_000_003 + self._portion, self.stop, self._pool,
+                self._pool_robot,
             )  # fmt: skip
         self._portion += 1
+        if len(self.seen) < MOST_SEEN:
+            for row, r in zip(self._pool.tolist(), self._pool_robot.tolist(), strict=True):
+                if r < 0:
+                    break
+                self.seen.add((r, tuple(row[: row.index(-1)])))
         self.routes = [[int(k) for k in row[: int(np.argmax(row < 0))]] for row in self._tour]
         return self.routes
 
@@ -124,9 +136,14 @@ def _sums(tour: Any, r: int, size: int, n: int, time_s: Any, energy_j: Any, cost
 @kernel(nogil=True)
 def search(
     tour: Any, value: Any, time_s: Any, energy_j: Any, cost: Any, time_limit: float, energy_limit: Any, near: Any,
-    rate: float, hot: float, cold: float, iterations: int, seed: int, halt: Any,
+    rate: float, hot: float, cold: float, iterations: int, seed: int, halt: Any, pool: Any,
+    pool_robot: Any,
 ) -> None:  # fmt: skip
-    """Improve ``tour`` (in and out: ``(R, N + 1)`` stops per robot, -1 after the last) in place."""
+    """Improve ``tour`` (in and out: ``(R, N + 1)`` stops per robot, -1 after the last) in place.
+
+    Routes of each plan that is better than any before it are written to ``pool`` (rows as in ``tour``) and
+    ``pool_robot`` (-1 after the last).
+    """
     random = np.array([seed], np.uint64)
     _uniform(random)
     n_robots, n = len(tour), len(value)
@@ -149,7 +166,8 @@ def search(
     touched = np.zeros(n_robots, np.bool_)
     waiting, rank = np.empty(n, np.int64), np.empty(n)
     cooling = (cold / hot) ** (1.0 / max(1, iterations))
-    heat = hot
+    heat, n_pool, top_score = hot, 0, now_score
+    pool_robot[:] = -1
     for _ in range(iterations):
         if halt[0] != 0:
             break
@@ -262,6 +280,12 @@ def search(
         score = now_value - rate * total
         if good and score > now_score + heat * np.log(1.0 - _uniform(random)):
             now_score = score
+            if score > top_score:
+                top_score = score
+                for r in range(n_robots):
+                    if touched[r] and n_pool < len(pool):
+                        pool[n_pool], pool_robot[n_pool] = tour[r], r
+                        n_pool += 1
             rounding = 1e-9 * max(1.0, best_value)
             if now_value > best_value + rounding or (
                 now_value > best_value - rounding and total < best_cost - 1e-9 * max(1.0, best_cost)

@@ -16,6 +16,7 @@ from react_opt.solvers.inspection.master import Column
 ELEMENTARY_UP_TO = 40  # targets; above, routes remember a neighbourhood
 NEIGHBOURHOOD = 8
 WORTH_NOTHING = 1e-9
+BEAM = 250  # labels per number of stops when routes are sought heuristically
 FIRST_LABELS = 4096  # room to begin with
 SLACK = 0.75
 
@@ -66,12 +67,15 @@ class Priced:
     best
         Largest profit of any route (of the relaxation), the threshold where none exceeds it; None where the
         search was not exact.
+    bound
+        Bound on the profit of any route, infinite where unknown: weaker than ``best``, always at hand.
     labels
         Labels made.
     """
 
     columns: list[Column]
     best: float | None
+    bound: float
     labels: int
 
 
@@ -150,11 +154,13 @@ class Pricer:
             prize = np.where(prize > WORTH_NOTHING, prize, -np.inf)
         memory = self.memory if mode == EXACT else self.everything
         charges = (np.zeros(n, np.uint64), np.zeros(64)) if cuts is None else (cuts.bits, cuts.penalty)
+        bound = np.zeros(1)
         while True:
             room = self._room
             made = best_routes(
                 prize, rate, self.cost, self.time_s, self.energy_j, self.arrays.time_limit_s, self.energy_limit,
-                memory, self.metric, threshold, mode, *self.buckets, *charges, stop, *room,
+                memory, self.metric, threshold, mode, *self.buckets, *charges, BEAM, bound, stop,
+                *room,
             )  # fmt: skip
             if made >= 0 or stop[0] != 0 or len(room[0]) >= most:
                 break
@@ -186,7 +192,7 @@ class Pricer:
                 columns.append(Column(self.group, tuple(stops), value, total))
             elif total < columns[seen[key]].cost:
                 columns[seen[key]] = Column(self.group, tuple(stops), value, total)
-        return Priced(columns, best, size)
+        return Priced(columns, best, float(bound[0]), size)
 
     def column(self, stops: tuple[int, ...]) -> Column:
         """Return a route as a column."""
