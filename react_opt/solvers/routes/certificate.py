@@ -19,6 +19,7 @@ def certificate(
     best: Multipliers,
     cuts: Sequence[Rank1Cut],
     rows: Sequence[Rank1Cut],
+    joule_price: Sequence[float],
 ) -> dict[str, Any]:
     """Return the certificate of a bound.
 
@@ -36,6 +37,9 @@ def certificate(
         The multipliers and the bound.
     cuts, rows
         The cuts and rows that the multipliers price.
+    joule_price
+        For each class a price of a joule at which the battery may be relaxed; it speeds up the recomputation and
+        is of no consequence for the bound.
     """
     priced_cuts = [
         {"cells": sorted(cut.cells), "memory": sorted(cut.memory), "price": float(price)}
@@ -58,8 +62,8 @@ def certificate(
         "bound": float(best.bound),
         "cell_price": [float(price) for price in best.duals.cell],
         "classes": [
-            {"robots": list(group.robots), "best": float(worth)}
-            for group, worth in zip(problem.classes, best.duals.group, strict=True)
+            {"robots": list(group.robots), "best": float(worth), "joule_price": float(rate)}
+            for group, worth, rate in zip(problem.classes, best.duals.group, joule_price, strict=True)
         ],
         "memory": "all" if memory.complete else [sorted(cells) for cells in memory.near],
         "cuts": priced_cuts,

@@ -64,7 +64,10 @@ class Priced:
 class Rank1Cut(Protocol):
     """A cut whose coefficient in a column is read off the column."""
 
-    rhs: float
+    @property
+    def rhs(self) -> float:
+        """Right-hand side of ``sum coefficient * use <= rhs``."""
+        ...
 
     def coefficient(self, column: Column) -> float:
         """Return the cut's coefficient in a column."""

@@ -73,7 +73,7 @@ def separate(
     used = np.flatnonzero(use > 1e-6)
     share = use[used]
     collects = np.zeros((len(used), n_cells))
-    for row, k in enumerate(used):
+    for row, k in enumerate(used.tolist()):
         collects[row, list(columns[k].cells)] = 1.0
     fractional = (share < 1.0 - 1e-6) if len(share) else share > 0
     share, collects, used = share[fractional], collects[fractional], used[fractional]
@@ -100,7 +100,7 @@ def separate(
         if per_cell[list(triple)].max() >= MOST_PER_CELL:
             continue
         memory = set(cells) | held.get(cells, frozenset())
-        for k in used:
+        for k in used.tolist():
             memory |= _between(columns[k], cells)
         if cells in held and memory <= held[cells]:
             continue

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
 from react_opt.route_problem import FloatArray, IntArray
-from react_opt.solvers.routes.columns import Column, Duals
-from react_opt.solvers.routes.cuts import SubsetRow
+from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut
 from react_opt.solvers.routes.labels import (
     NEVER,
     ORIGIN,
@@ -149,9 +148,7 @@ def grow_sets(
                         if (
                             joined
                             and collects == 0
-                            and not completed(
-                                v - p, m, s, f, mirrored, other, prices.cut_price, fuel.budget, cutoff
-                            )
+                            and not completed(v - p, m, s, f, mirrored, other, prices.cut_price, fuel.budget, cutoff)
                         ):
                             break
                         if found == room:
@@ -254,7 +251,7 @@ def enumerate_routes(
     duals: Duals,
     floor: float,
     side: SidePrices = NO_SIDE_PRICES,
-    cuts: Sequence[SubsetRow] = (),
+    cuts: Sequence[Rank1Cut] = (),
     *,
     max_labels: int = 500_000,
     max_routes: int = 50_000,

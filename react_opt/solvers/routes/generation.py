@@ -121,7 +121,8 @@ class Generation:
         """
         total = float(duals.cell.sum()) + float(self.counts @ best)
         total += sum(price * cut.rhs for price, cut in zip(duals.cut, self.master.cuts, strict=True))
-        return total + sum(price * row.rhs for price, row in zip(duals.row, self.master.rows, strict=True))
+        total += sum(price * row.rhs for price, row in zip(duals.row, self.master.rows, strict=True))
+        return float(total)
 
     def extended(self, duals: Duals) -> Duals:
         """Return multipliers with zeros for cuts and rows that came later.

@@ -107,12 +107,9 @@ class Master:
                 fresh.append(column)
         if not fresh:
             return 0
-        starts, index, value = [], [], []
-        for column in fresh:
-            starts.append(sum(len(part) for part in index))
-            rows, times = self._entries(column)
-            index.append(rows)
-            value.append(times)
+        entries = [self._entries(column) for column in fresh]
+        index, value = [rows for rows, _ in entries], [times for _, times in entries]
+        starts = np.cumsum([0] + [len(rows) for rows in index[:-1]])
         indices = np.concatenate(index).astype(np.int32)
         self._lp.addCols(
             len(fresh),

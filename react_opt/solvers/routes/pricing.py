@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.errors import UsageError
 from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
-from react_opt.solvers.routes.columns import Column, Duals, Priced
+from react_opt.solvers.routes.columns import Column, Duals, Priced, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.labels import (
     NEVER,
@@ -131,7 +132,7 @@ class RoutePricer:
         """Return whether the battery of a class can bind, so that labels carry it."""
         return bool(np.isfinite(self._fuel[group][0].budget))
 
-    def prices(self, group: int, duals: Duals, side: SidePrices, cuts: Sequence[SubsetRow]) -> tuple[Prices, Prices]:
+    def prices(self, group: int, duals: Duals, side: SidePrices, cuts: Sequence[Rank1Cut]) -> tuple[Prices, Prices]:
         """Return the prices of one class in both directions of time."""
         problem, data = self.problem, self.problem.classes[group]
         gain = problem.reward.T - (problem.sigma * data.sense_j + duals.cell)[None, :]
@@ -153,7 +154,7 @@ class RoutePricer:
         self,
         duals: Duals,
         side: SidePrices = NO_SIDE_PRICES,
-        cuts: Sequence[SubsetRow] = (),
+        cuts: Sequence[Rank1Cut] = (),
         *,
         width: int | None = None,
         columns: int = 10,
@@ -219,7 +220,7 @@ class RoutePricer:
         duals: Duals,
         floor: float,
         side: SidePrices,
-        cuts: Sequence[SubsetRow],
+        cuts: Sequence[Rank1Cut],
     ) -> tuple[Prices, Fuel, FloatArray, Labels | None, float]:
         """Return what bounds every single label of a class.
 
@@ -256,6 +257,11 @@ class RoutePricer:
             if complete:
                 return ahead, fuel, bound, labels, cutoff
         return ahead, fuel, bound, None, cutoff
+
+    @property
+    def joule_prices(self) -> list[float]:
+        """Price of a joule for each class, from the last call; 0 where the battery cannot bind."""
+        return list(self._rate)
 
     def _rest(self, group: int, prices: Prices, *, onwards: bool) -> tuple[Fuel, FloatArray]:
         """Return the battery with the prices of a joule, and the bound on the rest of a route at each of them.
@@ -340,7 +346,7 @@ class RoutePricer:
         stand: FloatArray,
         arc_cost: FloatArray,
         wait_cost: float,
-        cuts: Sequence[SubsetRow],
+        cuts: Sequence[Rank1Cut],
         cut_price: Sequence[float],
     ) -> Prices:
         """Return prices in kernel time."""
@@ -350,6 +356,8 @@ class RoutePricer:
         cut_of = np.zeros(n, dtype=np.uint64)
         cut_keep = np.full(n, 0, dtype=np.uint64)
         for k, cut in enumerate(cuts):
+            if not isinstance(cut, SubsetRow):
+                raise UsageError("routes can be priced with subset-row cuts only")
             bit = np.uint64(1) << np.uint64(k)
             cut_of[list(cut.cells)] |= bit
             cut_keep[list(cut.memory)] |= bit

@@ -100,7 +100,7 @@ def violated_limits(problem: RouteProblem, columns: Sequence[Column], use: Float
     used = np.flatnonzero(use > 1e-9)
     if problem.robots_per_cell is not None:
         standing = np.zeros((problem.horizon + 1, problem.n_cells))
-        for k in used:
+        for k in used.tolist():
             cells = columns[k].path.cell
             at = np.flatnonzero(cells >= 0)
             np.add.at(standing, (at + problem.horizon + 1 - len(cells), cells[at]), use[k])
@@ -109,7 +109,7 @@ def violated_limits(problem: RouteProblem, columns: Sequence[Column], use: Float
             rows.append(StandRow(int(cell), problem.horizon - int(instant), float(problem.robots_per_cell)))
     if problem.sensing_robots_per_step is not None:
         sensing = np.zeros(problem.horizon + 1)
-        for k in used:
+        for k in used.tolist():
             senses = columns[k].path.sense
             sensing[problem.horizon + 1 - len(senses) :] += use[k] * senses
         for instant in np.flatnonzero(sensing > problem.sensing_robots_per_step + VIOLATION):

@@ -115,6 +115,6 @@ def select(
         return Selection(None, bound if np.isfinite(bound) else None, solved)
     use = np.array(mip.getSolution().col_value)
     chosen: list[Column] = []
-    for k in np.flatnonzero(use > 0.5):
+    for k in np.flatnonzero(use > 0.5).tolist():
         chosen += [columns[k]] * round(float(use[k]))
     return Selection(sorted(chosen, key=lambda c: c.group), bound if np.isfinite(bound) else None, solved)
