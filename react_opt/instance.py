@@ -14,11 +14,14 @@ from react_opt.references import ReferenceFaultsError, reference_faults
 
 MAX_HORIZON_STEPS = 100_000
 MAX_COUNT = 2**63 - 1  # whole numbers fit an int64 array, whatever reads the file
+MAX_NUMBER = 1e30  # beyond anything physical; sums and products over a whole instance stay finite
+MIN_DIVISOR = 1e-30  # the same for what other numbers are divided by
 
 Id = Annotated[str, StringConstraints(strict=True, min_length=1)]
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MAX_NUMBER, le=MAX_NUMBER)]
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=MAX_NUMBER)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=MAX_NUMBER)]
+Divisor = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=MIN_DIVISOR, le=MAX_NUMBER)]
 Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
 Count = Annotated[int, Field(strict=True, ge=0, le=MAX_COUNT)]
 Flag = Annotated[bool, Field(strict=True)]
@@ -167,7 +170,7 @@ class AssignmentWeights(Part):
 
     alpha: NonNegative = 1.0
     beta: NonNegative = 1.0
-    time_ref_s: Positive = 1.0
+    time_ref_s: Divisor = 1.0
 
 
 class AssignmentInstance(Document):

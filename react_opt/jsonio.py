@@ -272,7 +272,7 @@ def _message(item: Any, model: type[BaseModel]) -> str:
 
 
 def _limit(value: Any) -> Any:
-    return int(value) if isinstance(value, float) and value.is_integer() else value
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 else value
 
 
 @lru_cache(maxsize=1024)

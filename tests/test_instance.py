@@ -34,6 +34,13 @@ BROKEN: list[tuple[str, str, Any, str | None, str]] = [
     ("oros", "name", 7, None, "expected a string, found 7"),
     ("oros", "weather", "fair", None, "unknown field"),
     ("oros", "robot", [], None, "did you mean 'robots'"),
+    # numbers so large or small that sums, products or quotients of a whole instance would overflow
+    ("oros", "cells[0].weight", 1e308, None, "expected a number <= 1e+30, found 1e+308"),
+    ("oros", "robots[0].capacity_j", 1.7e308, None, "expected a number <= 1e+30"),
+    ("oros", "robots[0].idle_w", 1e200, None, "expected a number <= 1e+30"),
+    ("oros", "step_s", 1e308, None, "expected a number <= 1e+30"),
+    ("oros", "cells[0].x_m", -1e308, None, "expected a number >= -1e+30"),
+    ("assignment", "weights.time_ref_s", 1e-300, None, "expected a number > 1e-30"),
     # whole numbers
     ("oros", "horizon_steps", 0, None, "expected a number >= 1, found 0"),
     ("oros", "horizon_steps", -3, None, "expected a number >= 1"),
@@ -119,7 +126,7 @@ BROKEN: list[tuple[str, str, Any, str | None, str]] = [
     ("assignment", "conflicts[0][1]", "t1", "conflicts[0]", "expected two different targets"),
     ("assignment", "conflicts[0]", ["t1"], "conflicts[0][1]", "required, but missing"),
     ("assignment", "weights.alpha", -1.0, None, "expected a number >= 0"),
-    ("assignment", "weights.time_ref_s", 0.0, None, "expected a number > 0"),
+    ("assignment", "weights.time_ref_s", 0.0, None, "expected a number > 1e-30"),
     # inspection
     ("inspection", "time_left_s", -1.0, None, "expected a number >= 0"),
     ("inspection", "robots[0].reserve_j", 101.0, None, "expected reserve_j <= battery_j"),
