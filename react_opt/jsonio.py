@@ -136,6 +136,7 @@ def write_bytes(content: bytes, path: str | os.PathLike[str]) -> None:
         if target.exists() and not target.is_file():  # a device or a pipe cannot be replaced by a rename
             target.write_bytes(content)
             return
+        target = Path(os.path.realpath(target))  # what a link leads to is replaced, not the link (/dev/stdout is one)
         with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as file:
             temporary = file.name
             file.write(content)

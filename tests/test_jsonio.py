@@ -380,3 +380,12 @@ def test_what_cannot_be_written_is_told_in_one_line(tmp_path: Path) -> None:
 def test_a_device_is_written_to_and_not_replaced() -> None:
     write_text("x", os.devnull)
     assert not Path(os.devnull).is_file()
+
+
+def test_writing_to_a_link_writes_what_it_leads_to(tmp_path):
+    # Run as root, a rename over the link made /dev/stdout a plain file.
+    (tmp_path / "file").write_text("old")
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    write_text("new", tmp_path / "link")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_text() == "new"
