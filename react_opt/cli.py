@@ -35,6 +35,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result itself in
 
 def main() -> NoReturn:
     """Run the command line; every expected failure is one line on standard error and an exit code."""
+    for name in ("stdout", "stderr"):  # closed by the caller: nobody reads what is printed
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
     try:
         code = app(standalone_mode=False)
         sys.stdout.flush()
@@ -61,8 +64,12 @@ def main() -> NoReturn:
         print("react-opt: out of memory; nothing was written", file=sys.stderr)
         code = NO_PLAN
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_on_stdout()
         code = OK
+    except OSError as error:  # files have said so already: this is standard output, on a full disk
+        _give_up_on_stdout()
+        print(f"react-opt: standard output cannot be written: {error.strerror or error}", file=sys.stderr)
+        code = BAD_INPUT
     code = code if isinstance(code, int) else OK
     watching = sys.modules.get("react_opt.solvers.watch")
     if watching is not None and watching.left_behind():  # the deadline holds for a solver that does not stop, too
@@ -70,6 +77,11 @@ def main() -> NoReturn:
         sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
+
+
+def _give_up_on_stdout() -> None:
+    """Let what is still to be flushed to standard output go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @app.callback(invoke_without_command=True)

@@ -235,3 +235,21 @@ def test_ctrl_c_writes_the_best_plan_so_far(tmp_path):
     plan = load(tmp_path / "plan.json")
     assert plan.claim.limit == "interrupt"
     assert check(instance, plan).ok
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that is always full is a Linux thing")
+@pytest.mark.parametrize("command", [["schema", "oros"], ["check", "instance.json", "plan.json"]])
+def test_standard_output_on_a_full_disk_is_one_line(command, files):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "react_opt.cli", *command], cwd=files, stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == ["react-opt: standard output cannot be written: No space left on device"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
+def test_standard_output_may_be_closed(files):
+    command = f"{sys.executable} -m react_opt.cli check instance.json plan.json >&-"
+    done = subprocess.run(["sh", "-c", command], cwd=files, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
