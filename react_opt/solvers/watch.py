@@ -47,6 +47,8 @@ class Watch:
         ``perf_counter()`` at which the solver has to stop; None for none.
     on_stop
         Called once by :meth:`stop`, for solvers that are told rather than asked.
+    on_leave
+        Called where the solver is left behind, for solvers that can be killed.
     """
 
     maximise: bool
@@ -56,6 +58,7 @@ class Watch:
     bound: float | None = None
     reason: Literal["time", "interrupt"] | None = None
     on_stop: Callable[[], None] | None = None
+    on_leave: Callable[[], None] | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def stop(self, reason: Literal["time", "interrupt"]) -> None:

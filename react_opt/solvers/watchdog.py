@@ -101,6 +101,8 @@ def _in_thread(watch: Watch, request: Request, started: float, run: Callable[[Wa
             leave_behind(thread)
             raise
     if not answer:
+        if watch.on_leave is not None:
+            watch.on_leave()
         leave_behind(thread)
         return Claim("no_solution", notes=["the solver had not stopped in time and was left behind"])
     if isinstance(answer[0], BaseException):

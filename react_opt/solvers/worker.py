@@ -98,6 +98,7 @@ def run_in_worker(target: str, args: tuple[str, ...], program: Program, request:
     """
     worker = _take(target)
     kept = False
+    watch.on_leave = worker.process.kill
     try:
         left_s = watch.remaining_s()
         deadline = None if left_s is None else monotonic() + left_s
@@ -115,6 +116,7 @@ def run_in_worker(target: str, args: tuple[str, ...], program: Program, request:
         kept = True
         raise
     finally:
+        watch.on_leave = None
         if kept:
             with _guard:
                 _idle.append(worker)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import sys
@@ -157,6 +158,13 @@ def crash(program: Program, request: Request, watch: Watch) -> Claim:
     raise AssertionError("unreachable")
 
 
+def hold(program: Program, request: Request, watch: Watch, *args: str) -> Claim:
+    if args:
+        return Claim("no_solution", notes=[str(os.getpid())])
+    ctypes.PyDLL(None).sleep(60)  # unlike CDLL, it keeps the lock, so no order to stop is heard
+    return Claim("no_solution")
+
+
 def fail(program: Program, request: Request, watch: Watch) -> Claim:
     raise ZeroDivisionError("by nought")
 
@@ -189,6 +197,25 @@ def test_a_worker_that_hangs_is_killed_and_what_it_told_is_kept() -> None:
     assert outcome.limit == "interrupt"
     assert outcome.objective == 17.0
     assert "was killed" in notes(outcome)
+
+
+def test_a_worker_that_is_left_behind_is_dead() -> None:
+    """Its process says who it is, holds the interpreter's lock for itself, and is gone when the answer is there."""
+    outcome = in_worker(hold, Request(), "warm")
+    (pid,) = (int(note) for note in outcome.settings["notes"])
+    outcome = in_worker(hold, Request(time_limit_s=0.1))
+    assert outcome.limit == "time"
+    deadline = perf_counter() + 20.0
+    while alive(pid):
+        assert perf_counter() < deadline
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def test_a_worker_that_crashes_is_reported_with_its_last_words() -> None:
