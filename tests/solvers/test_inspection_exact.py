@@ -15,8 +15,8 @@ from react_opt.errors import InputError
 from react_opt.models.inspection import InspectionArrays, Routes, build
 from react_opt.options import SolveOptions
 from react_opt.solvers.inspection import gate, simple_rule, solve_inspection
+from react_opt.solvers.inspection.answer import grid_of
 from react_opt.solvers.inspection.control import Control
-from react_opt.solvers.inspection.decompose import grid_of
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
 from react_opt.solvers.inspection.local import Searcher
 from react_opt.solvers.inspection.pricing import Pricer

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from react_opt.models.assignment import AssignmentArrays, FloatArray, IntArray, objective_of
-from react_opt.solvers.assignment.tree import DONE, STACK_FULL, STOPPED, greedy, pairs_of, search
+from react_opt.solvers.assignment.pairs import pairs_of
+from react_opt.solvers.assignment.tree import DONE, STACK_FULL, STOPPED, greedy, search
 from react_opt.solvers.outcome import Limit
 
 TOLERANCE = 1e-9  # relative to the objective: nodes within it are closed

@@ -22,9 +22,10 @@ from react_opt.plan import (
     gap_of,
 )
 from react_opt.solvers.highs_model import fresh_scheduler
+from react_opt.solvers.inspection.answer import Answer
 from react_opt.solvers.inspection.baseline import Gate, gate, simple_rule
 from react_opt.solvers.inspection.control import Control
-from react_opt.solvers.inspection.decompose import Answer, Decomposition
+from react_opt.solvers.inspection.decompose import Decomposition
 from react_opt.solvers.inspection.explain import Reason, reasons, with_losses
 from react_opt.solvers.inspection.whole import solve_whole
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from fractions import Fraction
 
 import numpy as np
 
 from react_opt.models.inspection import FloatArray, InspectionArrays, Routes
+from react_opt.solvers.inspection.answer import Answer, grid_of
 from react_opt.solvers.inspection.closing import Closing
 from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
@@ -39,52 +38,6 @@ COLUMNS = 30  # added per pricing
 MIP_NODES = 2000  # of an integer program under a work limit
 WARM_S, WARM_SHARE, WARM_PORTIONS = 2.0, 0.2, 8  # of local search before the first linear program
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
-
-
-@dataclass
-class Answer:
-    """What is known of an instance.
-
-    Parameters
-    ----------
-    routes
-        Best routes by value, then second objective; None where none are known.
-    value, cost
-        Their value and second objective; meaningless without routes.
-    value_bound
-        Proven upper bound on the value.
-    cost_bound
-        Proven lower bound on the second objective of plans of the best value; None where unknown.
-    infeasible
-        Whether it is proven that some class of robots has no route.
-    stuck
-        Whether labels or columns outgrew their limits, so that the search ended without a proof.
-    notes
-        Counts: columns, pricings, routes enumerated.
-    """
-
-    routes: Routes | None = None
-    value: float = -math.inf
-    cost: float = math.inf
-    value_bound: float = math.inf
-    cost_bound: float | None = None
-    infeasible: bool = False
-    stuck: bool = False
-    notes: dict[str, int] = field(default_factory=dict)
-
-
-def grid_of(values: FloatArray) -> float:
-    """Return the coarsest step of which all values are multiples, 0 where it is finer than 1e-5 of the largest."""
-    numerator, denominator = 0, 1
-    for value in values.tolist():
-        exact = Fraction(repr(value))
-        common = math.lcm(denominator, exact.denominator)
-        if common > 10**7:
-            return 0.0
-        numerator = math.gcd(numerator * (common // denominator), exact.numerator * (common // exact.denominator))
-        denominator = common
-    step = numerator / denominator
-    return step if len(values) and step > 1e-5 * float(values.max()) else 0.0
 
 
 class Decomposition:
@@ -162,8 +115,6 @@ class Decomposition:
         self.notes.update(columns=len(self.master.columns), work=self.control.work)
         return answer
 
-    # --- plans known ---
-
     def offer(self, routes: Routes) -> bool:
         """Keep routes where they are better; True where they were."""
         value, cost = self.arrays.worth(routes)
@@ -218,8 +169,6 @@ class Decomposition:
             seen = sorted(self.searcher.seen.copy())
             self.master.add([self.pricers[self.group[r]].column(stops) for r, stops in seen])
 
-    # --- bounds ---
-
     def _simple_bound(self) -> float:
         """Value of the targets that some robot can visit: as a first stop, where no detour is ever shorter."""
         arrays, n = self.arrays, len(self.arrays.value)
@@ -262,8 +211,6 @@ class Decomposition:
             answer.value_bound = max(bound, answer.value)
             if self.on_bound is not None:
                 self.on_bound(answer.value if answer.routes is not None else None, answer.value_bound)
-
-    # --- a stage ---
 
     def _stage(self, second: bool) -> bool:
         """Solve one stage; True where its objective is proven."""

@@ -8,7 +8,7 @@ from react_opt.models.inspection import InspectionArrays, Routes, program, route
 from react_opt.models.program import Program
 from react_opt.options import SolveOptions
 from react_opt.solvers.backend import Backend
-from react_opt.solvers.inspection.decompose import Answer
+from react_opt.solvers.inspection.answer import Answer
 from react_opt.solvers.outcome import Limit, Outcome, Request
 from react_opt.solvers.registry import DEFAULT, backend
 
