@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn, TypeVar
 
@@ -173,7 +175,8 @@ def solve(
     given = None if start is None else load(start)
     if output is not None:
         require_writable(output)
-    with Interruption() as interruption, live_line() as progress:
+    names = {"<data>": instance_file, "<start>": start or ""}
+    with _named(names), Interruption() as interruption, live_line() as progress:
         plan = solve_instance(
             instance,
             time_limit_s=time_limit,
@@ -258,6 +261,15 @@ def _one_of(option: str, value: str, allowed: Sequence[T]) -> T:
         if item == value:
             return item
     raise UsageError(f"{option}: expected one of {', '.join(map(str, allowed))}, found {value!r}")
+
+
+@contextlib.contextmanager
+def _named(files: dict[str, str]) -> Iterator[None]:
+    """Say the names of files in faults that were found in data."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError([replace(fault, file=files.get(fault.file, fault.file)) for fault in error.faults]) from None
 
 
 def _instance(document: Any, file: str) -> Any:

@@ -253,3 +253,11 @@ def test_standard_output_may_be_closed(files):
     command = f"{sys.executable} -m react_opt.cli check instance.json plan.json >&-"
     done = subprocess.run(["sh", "-c", command], cwd=files, stderr=subprocess.PIPE, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_bad_plan_to_start_from_is_named(run, files):
+    other = spoilt(files, lambda data: data.update(name="another"))
+    code, out, err = run("solve", other, "--start", files / "plan.json")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"{files / 'plan.json'}: expected a valid plan of this instance")
+    assert err.count("\n") == 1
