@@ -120,10 +120,9 @@ class Standing:
         """Return whether optimality or the wanted gap is reached, or a limit."""
         if self.proven():
             return True
-        known = self.gap is not None and self.bound is not None and self.objective is not None
-        if known and self.bound - self.objective <= self.gap * max(abs(self.objective), 1e-9):  # type: ignore[operator]
-            return True
-        return self.budget.over()
+        if self.gap is None or self.bound is None or self.objective is None:
+            return self.budget.over()
+        return self.bound - self.objective <= self.gap * max(abs(self.objective), 1e-9) or self.budget.over()
 
     def _tell(self) -> None:
         if self._on_progress is not None:

@@ -8,7 +8,6 @@ against an average of the routes found so far instead of the last ones alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +21,7 @@ from react_opt.solvers.routes.pricing import NO_SIDE_PRICES
 LEVELS = 8
 BEAM = 2
 FIRST_STEP = 0.05
+LAST_STEP = 1e-4
 PATIENCE = 12
 AVERAGE = 0.1
 
@@ -63,20 +63,14 @@ class DualAscent:
             if self.standing.done():
                 return
 
-    def volume(self, enough: Callable[[], bool]) -> None:
-        """Lower the bound by the volume algorithm until ``enough`` or a limit.
-
-        Parameters
-        ----------
-        enough
-            Asked after each step.
-        """
+    def volume(self) -> None:
+        """Lower the bound by the volume algorithm until its steps are tiny or a limit is reached."""
         if self.best is None:
             return
         centre = self.best.duals.cell
         bound, used = self._evaluate(centre)
         average, step, failures = used, FIRST_STEP, 0
-        while not (self.standing.done() or enough()):
+        while step > LAST_STEP and not self.standing.done():
             target = self.standing.objective
             target = 0.95 * bound if target is None else target
             direction = 1.0 - average
@@ -97,7 +91,7 @@ class DualAscent:
             else:
                 failures += 1
                 if failures == PATIENCE:
-                    step, failures = max(1e-3, 0.7 * step), 0
+                    step, failures = 0.7 * step, 0
         self.generation.best = self.best
 
     def _evaluate(self, cell: FloatArray) -> tuple[float, FloatArray]:

@@ -14,9 +14,7 @@ def best_per_set(problem: RouteProblem, group: RobotClass) -> dict[int, float]:
     best: dict[int, float] = {}
     arcs = [
         (int(i), int(j), int(d), float(q))
-        for i, j, d, q in zip(
-            problem.arc_from, problem.arc_to, problem.arc_steps, problem.arc_energy_j, strict=True
-        )
+        for i, j, d, q in zip(problem.arc_from, problem.arc_to, problem.arc_steps, problem.arc_energy_j, strict=True)
     ]
     seen: dict[tuple[int, int, int], list[tuple[float, float]]] = {}
 

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+from react_opt.certify_bound import recompute_bound
+from react_opt.errors import UsageError
+from react_opt.instance import OrosInstance
+from react_opt.solvers.routes.engine import solve_routes
+from react_opt.timegraph import route_problem
+
+
+def _instance(seed: int, battery_j: float) -> OrosInstance:
+    rng = np.random.default_rng(seed)
+    n = 6
+    travel = [
+        {"from": f"c{i}", "to": f"c{j}", "steps": int(rng.integers(1, 3)), "energy_j": float(rng.integers(20, 80))}
+        for i in range(n)
+        for j in range(n)
+        if i != j and rng.random() < 0.5
+    ]
+    return OrosInstance.model_validate(
+        {
+            "kind": "oros",
+            "name": "small",
+            "horizon_steps": 9,
+            "step_s": 10.0,
+            "cells": [{"id": f"c{i}", "x_m": 0.0, "y_m": 0.0, "weight": float(rng.integers(1, 4))} for i in range(n)],
+            "travel": travel,
+            "robots": [
+                {
+                    "id": f"r{k}",
+                    "start": "c0",
+                    "battery_j": battery_j,
+                    "capacity_j": battery_j,
+                    "idle_w": 2.0,
+                    "sensing_w": 9.0,
+                }
+                for k in range(2)
+            ],
+        }
+    )
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("battery_j", [5000.0, 420.0])
+def test_recomputed_bound_is_the_claimed_one_and_above_the_optimum(seed: int, battery_j: float) -> None:
+    """The plain dynamic programme confirms the prices of the solver, with and without a binding battery."""
+    instance = _instance(seed, battery_j)
+    result = solve_routes(route_problem(instance), work_limit=2000)
+    bound = recompute_bound(instance, result.certificate)
+    assert result.status == "optimal"
+    assert bound <= result.certificate["bound"] * (1 + 1e-8)
+    assert bound >= result.objective - 1e-9
+
+
+def test_a_certificate_that_claims_too_much_is_found_out() -> None:
+    """Lowering the claimed value of a class does not lower the recomputed bound."""
+    instance = _instance(1, 5000.0)
+    result = solve_routes(route_problem(instance), work_limit=2000)
+    forged = {**result.certificate, "classes": [{**g, "best": g["best"] - 3.0} for g in result.certificate["classes"]]}
+    assert recompute_bound(instance, forged) >= result.objective - 1e-9
+
+
+def test_any_prices_give_a_bound() -> None:
+    """Bounds are valid whatever the prices are: too high, too low or zero."""
+    instance = _instance(2, 5000.0)
+    result = solve_routes(route_problem(instance), work_limit=2000)
+    for factor in (0.0, 0.5, 2.0):
+        changed = {**result.certificate, "cell_price": [factor * p for p in result.certificate["cell_price"]]}
+        changed["classes"] = [{**group, "best": 0.0} for group in changed["classes"]]
+        assert recompute_bound(instance, changed) >= result.objective - 1e-9
+
+
+def test_certificate_of_another_instance_is_refused() -> None:
+    """The number of prices has to be that of the cells, and every robot has to be named once."""
+    instance = _instance(1, 5000.0)
+    result = solve_routes(route_problem(instance), work_limit=2000)
+    with pytest.raises(UsageError, match="prices 5 cells"):
+        recompute_bound(instance, {**result.certificate, "cell_price": [0.0] * 5})
+    with pytest.raises(UsageError, match="every robot once"):
+        recompute_bound(instance, {**result.certificate, "classes": [{"robots": [0], "best": 1.0}]})
