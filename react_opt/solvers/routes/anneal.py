@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
+from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.moves import (
     Order,
     RandomState,
@@ -25,7 +26,6 @@ from react_opt.solvers.routes.moves import (
     skip,
     swap_tails,
 )
-from react_opt.solvers.routes.problem import FloatArray, IntArray
 from react_opt.solvers.routes.ranking import inner, ranking
 
 _DELAYS = 8  # delays whose loss is tabulated

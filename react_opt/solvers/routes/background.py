@@ -7,8 +7,8 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.routes.budget import Standing
-from react_opt.solvers.routes.problem import Route, RouteProblem
 from react_opt.solvers.routes.search import improve
 
 SHARE = 0.3  # of the time, where the primal search has no thread of its own

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.route_problem import FloatArray, RobotClass, Route, RouteProblem
 from react_opt.solvers.routes.labelling import beam
-from react_opt.solvers.routes.problem import FloatArray, RobotClass, Route, RouteProblem
 from react_opt.solvers.routes.residual import Leftover, leftover, potential, shape_prices, survival
 
 UNLIMITED = 1 << 60

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
-from react_opt.solvers.routes.problem import FloatArray, IntArray
+from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.ranking import inner, ranking
 from react_opt.solvers.routes.residual import Mask
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from react_opt.solvers.routes.problem import FloatArray, IntArray
+from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.ranking import inner
 from react_opt.solvers.routes.sequences import Steps
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from react_opt.kernels import kernel
-from react_opt.solvers.routes.problem import FloatArray, IntArray
+from react_opt.route_problem import FloatArray, IntArray
 
 inner = kernel(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """Kernel that only kernels call: without the wrappers for Python, which take longer to compile than it does."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from react_opt.solvers.routes.problem import FloatArray, IntArray, Route, RouteProblem
+from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
 
 TOLERANCE = 1e-6
 """Relative slack granted to battery and charge limits."""

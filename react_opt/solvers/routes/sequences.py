@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
+from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
 from react_opt.solvers.routes.greedy import route_classes
-from react_opt.solvers.routes.problem import FloatArray, IntArray, Route, RouteProblem
 
 Steps = NDArray[np.int32]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from react_opt.solvers.routes.problem import RobotClass, Route, RouteProblem
+from react_opt.route_problem import RobotClass, Route, RouteProblem
 
 
 def random_problem(rng: np.random.Generator, **given: Any) -> RouteProblem:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from primal_cases import all_routes, best_value, random_problem
 
+from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.routes.beam import best_response
-from react_opt.solvers.routes.problem import Route, RouteProblem
 from react_opt.solvers.routes.replay import feasible, value
 
 
