@@ -11,6 +11,7 @@ import numpy as np
 
 from react_opt.route_problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.beam import Response, affordable_width, best_response, needed_battery
+from react_opt.solvers.routes.crowding import most_placed
 from react_opt.solvers.routes.replay import coupling_faults, feasible
 from react_opt.solvers.routes.residual import leftover
 
@@ -63,8 +64,9 @@ def proven_infeasible(problem: RouteProblem) -> InfeasibleRobot | None:
     """Proof that no plan exists, or None where this relaxation finds none.
 
     Exact for each robot alone: the least battery with which it reaches the horizon (and its ``return_to``)
-    without falling below its reserve, all chargers and places being its own. Of the coupling limits only the
-    robots that must stand in one cell at one instant are counted.
+    without falling below its reserve, all chargers and places being its own. Of the coupling limits only
+    ``robots_per_cell`` is looked at: where robots must stand at one instant, and whether they can disperse from
+    their starts.
 
     Parameters
     ----------
@@ -96,6 +98,10 @@ def proven_infeasible(problem: RouteProblem) -> InfeasibleRobot | None:
                 if tied[place] > most:
                     text = f"{tied[place]} robots must stand in cell {place[0]} at instant {place[1]}"
                     return InfeasibleRobot(group.robots[-1], "robots_per_cell", text)
+        crowd = most_placed(problem)
+        if crowd is not None:
+            text = f"{crowd[0]} robots start where only {crowd[1]} find room in the first steps"
+            return InfeasibleRobot(problem.classes[-1].robots[-1], "robots_per_cell", text)
     return None
 
 

@@ -66,6 +66,26 @@ def test_a_robot_that_cannot_last_or_return_is_named() -> None:
     assert _proof(replace(problem, classes=(crowd,), robots_per_cell=1)).rule == "robots_per_cell"
 
 
+def test_a_crowd_that_cannot_disperse_is_named() -> None:
+    """Three robots in one cell that only one arc leaves: at instant 1 there is room for one in each of two cells."""
+    base = random_problem(np.random.default_rng(3), cells=2, robots=1, chargers=False, coupled=False, horizon=5)
+    ends = (base.arc_steps == 1) | (base.arc_steps == base.arc_steps.min())
+    group = replace(base.classes[0], start_step=0, return_to=-1, battery_j=999.0, capacity_j=999.0)
+    short = replace(
+        base,
+        arc_from=base.arc_from[ends],
+        arc_to=base.arc_to[ends],
+        arc_steps=np.ones(ends.sum(), dtype=np.int64),
+        arc_energy_j=base.arc_energy_j[ends],
+        arc_travel=np.arange(ends.sum()),
+        out_start=np.searchsorted(base.arc_from[ends], np.arange(3)).astype(np.int64),
+        robots_per_cell=1,
+    )
+    three = replace(group, robots=(0, 1, 2))
+    assert _proof(replace(short, classes=(three,))).rule == "robots_per_cell"
+    assert greedy(replace(short, classes=(replace(group, robots=(0, 1)),))).routes is not None
+
+
 def test_same_seed_same_plan() -> None:
     for seed in range(20):
         problem = random_problem(np.random.default_rng(seed), robots=3)
