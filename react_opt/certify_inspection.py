@@ -156,8 +156,9 @@ def _skipped(instance: InspectionInstance, plan: InspectionPlan) -> Iterator[Vio
         return
     targets = [target.id for target in instance.targets]
     true: dict[str, set[str]] = {name: set() for name in targets}
+    place, general = _shared(instance)
     for robot in instance.robots:
-        reach, in_time, in_energy = _fits(instance, robot)
+        reach, in_time, in_energy = _fits(instance, robot, place, general)
         for k, name in enumerate(targets):
             if reach[k]:
                 true[name] |= {"outbid"} if in_time[k] and in_energy[k] else set()
@@ -178,17 +179,32 @@ def _skipped(instance: InspectionInstance, plan: InspectionPlan) -> Iterator[Vio
             yield Violation("reason", row.target, None, -row.loss, text)
 
 
-def _fits(instance: InspectionInstance, robot: InspectionRobot) -> tuple[list[bool], list[bool], list[bool]]:
-    """Return per target whether chains of rows lead over it, and whether the least time and energy are there."""
+def _shared(instance: InspectionInstance) -> tuple[dict[str, int], NDArray[np.float64]]:
+    """Return the number of each place, targets first, and time and energy of the rows for every robot."""
     place = {target.id: index for index, target in enumerate(instance.targets)}
     for row in instance.travel:
         place.setdefault(row.from_, len(place))
         place.setdefault(row.to, len(place))
-    start = place.setdefault(robot.at, len(place))
-    end = None if robot.end is None else place.setdefault(robot.end, len(place))
-    legs = np.full((2, len(place), len(place)), np.inf)
-    for row in sorted(instance.travel, key=lambda row: row.robot is not None):
-        if row.robot in (None, robot.id) and row.from_ != row.to:
+    for robot in instance.robots:
+        place.setdefault(robot.at, len(place))
+        place.setdefault(robot.end or robot.at, len(place))
+    general = np.full((2, len(place), len(place)), np.inf)
+    rows = [row for row in instance.travel if row.robot is None and row.from_ != row.to]
+    if rows:
+        at, to = [place[row.from_] for row in rows], [place[row.to] for row in rows]
+        general[:, at, to] = np.array([(row.time_s, row.energy_j) for row in rows]).T
+    return place, general
+
+
+def _fits(
+    instance: InspectionInstance, robot: InspectionRobot, place: dict[str, int], general: NDArray[np.float64]
+) -> tuple[list[bool], list[bool], list[bool]]:
+    """Return per target whether chains of rows lead over it, and whether the least time and energy are there."""
+    start = place[robot.at]
+    end = None if robot.end is None else place[robot.end]
+    legs = general.copy()
+    for row in instance.travel:
+        if row.robot == robot.id and row.from_ != row.to:
             legs[:, place[row.from_], place[row.to]] = row.time_s, row.energy_j
     n = len(instance.targets)
     service = np.zeros((2, len(place)))

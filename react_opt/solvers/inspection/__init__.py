@@ -31,10 +31,12 @@ from react_opt.solvers.inspection.whole import solve_whole
 
 __all__ = ["Gate", "gate", "inspect", "simple_rule", "solve_inspection"]
 
-CHECK_S = 0.01  # kept for reading the plan back and checking it
+CHECK_S, CHECK_ROW_S = 0.01, 3e-5  # kept for reading the plan back and checking it, and more per travel row
 
 
-def inspect(arrays: InspectionArrays, options: SolveOptions, routes: Routes | None = None) -> tuple[Answer, Control]:
+def inspect(
+    arrays: InspectionArrays, options: SolveOptions, routes: Routes | None = None, reserve_s: float = 0.0
+) -> tuple[Answer, Control]:
     """Solve an inspection on arrays by route decomposition: the entry for a control loop.
 
     Parameters
@@ -45,6 +47,8 @@ def inspect(arrays: InspectionArrays, options: SolveOptions, routes: Routes | No
         Limits, threads, seed and gap. The unit of ``work_limit`` is one pricing or one portion of local search.
     routes
         Feasible routes to start from; None for none.
+    reserve_s
+        Seconds of the time limit to leave to the caller.
 
     Returns
     -------
@@ -53,7 +57,7 @@ def inspect(arrays: InspectionArrays, options: SolveOptions, routes: Routes | No
     Control
         What stopped it, and the work done.
     """
-    deadline = None if options.deadline is None else options.deadline - CHECK_S
+    deadline = None if options.deadline is None else options.deadline - reserve_s
 
     def report(value: float | None, bound: float) -> None:
         if options.on_progress is not None:
@@ -77,6 +81,7 @@ def solve_inspection(instance: InspectionInstance, options: SolveOptions, start:
         Where ``start`` is no valid plan of the instance.
     """
     model = build(instance)
+    reserve_s = CHECK_S + CHECK_ROW_S * len(instance.travel)
     known = None if start is None else _started(instance, model, start)
     wall_s = {"build": time.perf_counter() - options.begun}
     begun = time.perf_counter()
@@ -89,7 +94,7 @@ def solve_inspection(instance: InspectionInstance, options: SolveOptions, start:
         found_with = {**versions("numpy", "scipy"), solver: version}
         settings.update(more)
     else:
-        answer, control = inspect(model.arrays, options, known)
+        answer, control = inspect(model.arrays, options, known, reserve_s)
         limit = control.limit
         if answer.stuck and limit == "none":
             limit = "memory"
@@ -106,7 +111,7 @@ def solve_inspection(instance: InspectionInstance, options: SolveOptions, start:
     begun = time.perf_counter()
     optimal = answer.value_bound - answer.value <= OPTIMAL_GAP * abs(answer.value)
     if options.explain and optimal:
-        deadline = None if options.deadline is None else options.deadline - CHECK_S
+        deadline = None if options.deadline is None else options.deadline - reserve_s
         with Control(deadline, None, options.should_stop) as left:
             why = with_losses(model.arrays, answer.routes, answer.value, left, options.seed)
     else:

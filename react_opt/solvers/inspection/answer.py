@@ -53,3 +53,8 @@ def grid_of(values: FloatArray) -> float:
         denominator = common
     step = numerator / denominator
     return step if len(values) and step > 1e-5 * float(values.max()) else 0.0
+
+
+def rounded(bound: float, grid: float) -> float:
+    """Return a bound on a value, rounded down to the grid of values (0: no grid)."""
+    return math.floor(bound / grid + 1e-6) * grid if grid > 0 else bound

@@ -8,20 +8,19 @@ are enumerated, and an integer program over them is exact.
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable
 
 import numpy as np
 
 from react_opt.models.inspection import FloatArray, InspectionArrays, Routes
-from react_opt.solvers.inspection.answer import Answer, grid_of
+from react_opt.solvers.inspection.answer import Answer, grid_of, rounded
 from react_opt.solvers.inspection.closing import Closing
 from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
 from react_opt.solvers.inspection.local import Searcher
 from react_opt.solvers.inspection.master import Column, Duals, Master
-from react_opt.solvers.inspection.pricing import ELEMENTARY_UP_TO, Cuts, Pricer, classes_of
+from react_opt.solvers.inspection.pricing import ELEMENTARY_UP_TO, Cuts, Pricer, classes_of, simple_bound
 
 VALUE_TOLERANCE = 1e-7  # relative: plans whose values agree within it are worth the same
 COST_TOLERANCE = 1e-7
@@ -89,7 +88,7 @@ class Decomposition:
     def run(self, second: bool = True) -> Answer:
         """Solve as far as the control lets it, the first stage alone where not ``second``; see :class:`Answer`."""
         answer = self.answer
-        answer.value_bound = self._simple_bound()
+        answer.value_bound = simple_bound(self.arrays, self.pricers, self.grid)
         self._search(FIRST_PORTION)
         if self.beside:
             self._thread = threading.Thread(target=self._search_on, daemon=True)
@@ -169,18 +168,6 @@ class Decomposition:
             seen = sorted(self.searcher.seen.copy())
             self.master.add([self.pricers[self.group[r]].column(stops) for r, stops in seen])
 
-    def _simple_bound(self) -> float:
-        """Value of the targets that some robot can visit: as a first stop, where no detour is ever shorter."""
-        arrays, n = self.arrays, len(self.arrays.value)
-        within = np.zeros(n, np.bool_)
-        for pricer in self.pricers:
-            if not pricer.metric:
-                return float(arrays.value.sum())
-            t = pricer.time_s[n, :n] + pricer.time_s[:n, n + 1]
-            e = pricer.energy_j[n, :n] + pricer.energy_j[:n, n + 1]
-            within |= (t <= arrays.time_limit_s) & (e <= pricer.energy_limit)
-        return float(arrays.value[within].sum())
-
     def _value_slack(self) -> float:
         value = self.answer.value
         return max(VALUE_TOLERANCE * abs(value), self.gap * abs(value))
@@ -205,8 +192,7 @@ class Decomposition:
             answer.cost_bound = max(bound, answer.cost_bound or 0.0)
             return
         bound = earned - float(duals.target.sum()) - float(duals.cuts.sum())
-        if self.grid > 0:
-            bound = math.floor(bound / self.grid + 1e-6) * self.grid
+        bound = rounded(bound, self.grid)
         if bound < answer.value_bound:
             answer.value_bound = max(bound, answer.value)
             if self.on_bound is not None:

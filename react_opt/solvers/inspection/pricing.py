@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
 from react_opt.models.inspection import ABSENT, FloatArray, InspectionArrays, IntArray
+from react_opt.solvers.inspection.answer import rounded
 from react_opt.solvers.inspection.labels import EXACT, HEURISTIC, MOST_BUCKETS, best_routes
 from react_opt.solvers.inspection.master import Column
 
@@ -227,6 +228,34 @@ def _bucket_count(resource: FloatArray, limit: float, n: int) -> int:
         return 0
     count = int(np.ceil(limit / least)) + 1
     return 0 if count > MOST_BUCKETS else max(count, min(60, 4 * n))
+
+
+def simple_bound(arrays: InspectionArrays, pricers: list[Pricer], grid: float) -> float:
+    """Return a bound on the value that needs no solver.
+
+    Only targets count that some robot can visit first and then go to its end (where no detour is shorter), and
+    of these as much, in fractions, as the budgets of all robots together pay for when every visit costs no more
+    than the cheapest drive to it and its service.
+    """
+    n = len(arrays.value)
+    within = np.zeros(n, np.bool_)
+    for pricer in pricers:
+        t = pricer.time_s[n, :n] + pricer.time_s[:n, n + 1]
+        e = pricer.energy_j[n, :n] + pricer.energy_j[:n, n + 1]
+        within |= (t <= arrays.time_limit_s) & (e <= pricer.energy_limit) if pricer.metric else True
+    value = np.where(within, arrays.value, 0.0)
+    best = float(value.sum())
+    if not n or not len(arrays.time_s):
+        return best if len(arrays.time_s) else 0.0
+    limits = np.full(len(arrays.time_s), arrays.time_limit_s), arrays.energy_limit_j
+    for drives, limit in zip((arrays.time_s, arrays.energy_j), limits, strict=True):
+        to_end = drives[:, : n + 1, n + 1].min(axis=1)
+        budget = float(np.maximum(limit - to_end, 0.0).sum())
+        needs = drives[:, : n + 1, :n].min(axis=(0, 1))
+        order = np.argsort(-value / np.maximum(needs, 1e-12), kind="stable")
+        share = np.clip((budget - (np.cumsum(needs[order]) - needs[order])) / np.maximum(needs[order], 1e-12), 0.0, 1.0)
+        best = min(best, float((share * value[order]).sum()))
+    return rounded(best + 1e-9 * max(1.0, best), grid)
 
 
 def _tightness(resource: FloatArray, limit: float) -> float:
