@@ -9,6 +9,9 @@ from benchmarks.families import walled_grid
 from react_opt import check, loads, parse, solve
 from react_opt.errors import InputError, MissingPartError, UsageError
 from react_opt.jsonio import dumps
+from react_opt.solvers import monolith, oros
+from react_opt.solvers.outcome import Outcome, Request
+from react_opt.timegraph import route_problem
 
 
 def star(arms=3, horizon=4, **changes):
@@ -216,3 +219,28 @@ def test_bad_options_are_refused_before_anything_is_compiled(options, monkeypatc
     monkeypatch.setattr("react_opt.planner.warm_up", warm_up)
     with pytest.raises(UsageError):
         solve(star(), **options)
+
+
+@pytest.mark.parametrize("options", [{"method": "monolith"}, {"solver": "cp-sat"}])
+def test_a_monolith_that_cannot_be_built_in_time_is_not_begun(options, monkeypatch):
+    # Building it cannot be interrupted: begun with half a second left, one of a million columns took half a minute.
+    monkeypatch.setattr(oros, "BUILD_S", 1.0)
+    monkeypatch.setattr(oros, "solve_monolith", None)
+    instance = parse(walled_grid(3, 3, 2, 8, seed=1))
+    plan = solve(instance, time_limit_s=20.0, **options)
+    assert (plan.claim.status, plan.claim.limit) == ("feasible", "time")
+    assert plan.claim.settings["monolith"].startswith("not built")
+    assert check(instance, plan).ok
+
+
+def test_building_the_monolith_counts_against_its_time_limit(monkeypatch):
+    class Backend:
+        def solve(self, program, request):
+            self.limit_s = request.time_limit_s
+            return Outcome(status="no_solution", limit="time", solver="none", version="0")
+
+    backend, clock = Backend(), iter([100.0, 103.0])
+    monkeypatch.setattr(monolith, "backend", lambda name: backend)
+    monkeypatch.setattr(monolith, "perf_counter", lambda: next(clock))
+    monolith.solve_monolith(star(), route_problem(star()), "highs", Request(time_limit_s=10.0), None)
+    assert backend.limit_s == 7.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from time import perf_counter
 
 from react_opt.instance import OrosInstance
 from react_opt.models.oros import OrosModel, oros_model
@@ -44,11 +45,14 @@ def solve_monolith(
     routes
         Tidy routes, None where the backend found nothing usable.
     """
+    begun = perf_counter()
     chosen = backend(solver)
     model = oros_model(instance, problem)
     start = None if routes is None else model.vector(list(routes))
     program = model.program if keep_until is None or start is None else _frozen(model, start, keep_until)
-    outcome = chosen.solve(program, replace(request, start=start))
+    limit_s = request.time_limit_s  # building the model took some of it
+    left_s = None if limit_s is None else max(0.0, limit_s - (perf_counter() - begun))
+    outcome = chosen.solve(program, replace(request, start=start, time_limit_s=left_s))
     if outcome.x is None:
         return outcome, None
     return outcome, tidy(problem, model.routes(outcome.x))

@@ -27,6 +27,7 @@ from react_opt.timegraph import route_problem
 MAX_ENTRIES = 150_000_000  # cells x steps of the reward profile: about 5 GB while it is built
 MAX_PLAN_STEPS = 5_000_000  # rows of a plan file
 MAX_COLUMNS = 4_000_000  # of the monolith
+BUILD_S = 1e-5  # per column of the monolith, to build it and hand it to a solver: neither can be interrupted
 COUPLED_SHARE = 0.3  # of the time, for the decomposition where there are limits between robots
 COUPLED_S, SMALL_COLUMNS = 1.0, 50_000  # at most so long where the monolith is small
 IMPROVE_S, IMPROVE_SHARE, IMPROVE_WORK = 1.0, 0.05, 20  # primal search before the monolith
@@ -201,7 +202,10 @@ def _routes_then_monolith(search: Search) -> None:
 def _until(search: Search) -> float | None:
     """Return when the decomposition leaves the rest of the time to the monolith."""
     options, left_s = search.options, search.options.left_s()
-    small = column_count(search.problem) <= SMALL_COLUMNS
+    columns = column_count(search.problem)
+    if left_s is not None and BUILD_S * columns > (1.0 - COUPLED_SHARE) * left_s:
+        return None  # the monolith could not even be built
+    small = columns <= SMALL_COLUMNS
     shares = [COUPLED_S if small else None, None if left_s is None else COUPLED_SHARE * left_s]
     known = [share for share in shares if share is not None]
     return time.perf_counter() + min(known) if known and options.work_limit is None else None
@@ -254,7 +258,12 @@ def _monolith(search: Search) -> None:
         search.settings["monolith"] = f"not built: about {columns} columns, at most {MAX_COLUMNS}"
         search.limit = "memory"
         return
-    if options.left_s() == 0.0:
+    left_s = options.left_s()
+    if left_s == 0.0:
+        search.limit = "time"
+        return
+    if left_s is not None and BUILD_S * columns > left_s:
+        search.settings["monolith"] = f"not built: about {columns} columns, too many for {left_s:.2g} s"
         search.limit = "time"
         return
     _improve(search)
