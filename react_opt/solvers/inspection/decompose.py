@@ -9,6 +9,7 @@ are enumerated, and an integer program over them is exact.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -35,7 +36,7 @@ PORTION = 2000
 LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing limits the search
 COLUMNS = 30  # added per pricing
 MIP_NODES = 2000  # of an integer program under a work limit
-WARM_S, WARM_SHARE, WARM_PORTIONS = 2.0, 0.2, 8  # of local search before the first linear program
+WARM_S, WARM_SHARE, WARM_PORTIONS = 10.0, 0.6, 8  # of local search before the first linear program
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
 
 
@@ -269,7 +270,11 @@ class Decomposition:
                 self._search(PORTION)
         else:
             left_s = self.control.left_s()
-            self._thread.join(WARM_S if left_s is None else min(WARM_S, WARM_SHARE * left_s))
+            until = time.perf_counter() + (WARM_S if left_s is None else min(WARM_S, WARM_SHARE * left_s))
+            if self.answer.routes is not None:  # a second search, with a seed of its own, on this thread
+                other = Searcher(self.arrays, self.answer.routes, self.seed + 1, self.control.flag)
+                while time.perf_counter() < until and not self.control.stopped():
+                    self.offer(other.run(PORTION))
             self._collect()
         self._pool()
 

@@ -19,7 +19,7 @@ from react_opt.models.inspection import InspectionArrays, Routes
 MEAN_REMOVED = 8.0
 LONGEST_STRING = 10.0
 BLINK = 0.01
-RATES = (2.0, 1.0, 0.3, 0.02)
+RATES = (2.0, 1.0)
 POOL = 200  # routes remembered per portion
 MOST_SEEN = 3000  # routes remembered in all
 
