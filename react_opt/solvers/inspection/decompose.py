@@ -37,6 +37,7 @@ LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing
 COLUMNS = 30  # added per pricing
 MIP_NODES = 2000  # of an integer program under a work limit
 WARM_S, WARM_SHARE, WARM_PORTIONS = 10.0, 0.6, 8  # of local search before the first linear program
+FRESH_EVERY = 25  # portions of such a search
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
 
 
@@ -271,10 +272,13 @@ class Decomposition:
         else:
             left_s = self.control.left_s()
             until = time.perf_counter() + (WARM_S if left_s is None else min(WARM_S, WARM_SHARE * left_s))
-            if self.answer.routes is not None:  # a second search, with a seed of its own, on this thread
-                other = Searcher(self.arrays, self.answer.routes, self.seed + 1, self.control.flag)
-                while time.perf_counter() < until and not self.control.stopped():
-                    self.offer(other.run(PORTION))
+            empty: Routes = [[] for _ in self.arrays.time_s]
+            fresh, turn = empty if self.arrays.is_feasible(empty) else self.answer.routes, 0
+            while fresh is not None and time.perf_counter() < until and not self.control.stopped():
+                if turn % FRESH_EVERY == 0:  # searches that begin anew, on this thread
+                    other = Searcher(self.arrays, fresh, self.seed + 1 + turn, self.control.flag)
+                self.offer(other.run(PORTION))
+                turn += 1
             self._collect()
         self._pool()
 
