@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.routes.bounds import Lattice, tolerance
@@ -57,6 +62,21 @@ class Budget:
             elif self.deadline is not None and time.perf_counter() >= self.deadline:
                 self.limit = "time"
         return self.limit != "none"
+
+
+@contextmanager
+def stopping(deadline: float | None, stop: NDArray[np.uint8]) -> Iterator[None]:
+    """Set the flag that compiled passes look at when the deadline is there; one of them may take many seconds."""
+    timer = None
+    if deadline is not None:
+        timer = threading.Timer(max(0.0, deadline - time.perf_counter()), stop.fill, [1])
+        timer.daemon = True
+        timer.start()
+    try:
+        yield
+    finally:
+        if timer is not None:
+            timer.cancel()
 
 
 class Standing:

@@ -12,7 +12,7 @@ import numpy as np
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes.background import beside
-from react_opt.solvers.routes.budget import Budget, Limit, OnProgress, Standing
+from react_opt.solvers.routes.budget import Budget, Limit, OnProgress, Standing, stopping
 from react_opt.solvers.routes.certificate import certificate
 from react_opt.solvers.routes.columns import Column
 from react_opt.solvers.routes.cuts import separate
@@ -135,7 +135,7 @@ def solve_routes(
             return RoutesResult(None, None, None, "infeasible", "none", notes=(first.reason.text,))
     fresh_scheduler()
     search = _Proof(problem, standing, threads, seed)
-    with beside(standing, threads, seed):
+    with stopping(deadline, search.pricer.stop), beside(standing, threads, seed):
         search.run()
     return search.result()
 
@@ -168,6 +168,8 @@ class _Proof:
                 wait_s = min(wait_s, 0.05 * max(0.0, budget.deadline - budget.begun))
             self._improve_until(time.perf_counter() + wait_s, FIRST_SEARCH_WORK)
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
+        if self.standing.done():
+            return
         ascent = DualAscent(self.generation)
         ascent.uniform(float(self.problem.reward.max(initial=0.0)))
         if self.problem.n_cells > MANY_CELLS:

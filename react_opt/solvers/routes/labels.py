@@ -225,6 +225,7 @@ def grow_labels(
     width: int,
     max_labels: int,
     buys_back: bool,
+    stop: NDArray[np.uint8],
 ) -> tuple[Labels, bool]:
     """Return all undominated labels that may still end at ``cutoff`` or more, and whether none was lost.
 
@@ -249,6 +250,8 @@ def grow_labels(
     buys_back
         False compares memories by inclusion alone: needed where the labels bound each single label of the other
         direction rather than the best route.
+    stop
+        ``(1,)`` flag that another thread sets at the deadline: the pass is then given up as with ``max_labels``.
     """
     n = len(graph.in_start) - 1
     last = len(prices.gain) - 1
@@ -279,6 +282,9 @@ def grow_labels(
         for j in range(n):
             node = tau * n + j
             start[node] = count
+            if stop[0] != 0:
+                complete = False
+                continue
             if tau < origin_time or completion[0, tau, j] <= NEVER:
                 continue
             mirrored = (last - tau) * n + j

@@ -66,6 +66,7 @@ class RoutePricer:
     def __init__(self, problem: RouteProblem, memory: Memory) -> None:
         self.problem = problem
         self.memory = memory
+        self.stop = np.zeros(1, np.uint8)  # not 0: labelling passes are given up at once
         n, horizon = problem.n_cells, problem.horizon
         by_target = np.lexsort((problem.arc_from, problem.arc_to))
         self._in_arcs = by_target.astype(np.int64)
@@ -206,6 +207,7 @@ class RoutePricer:
                 MAX_LABELS if width is None else width,
                 max_labels,
                 True,
+                self.stop,
             )
             chosen, top = self._finals(labels, group, columns)
             found += [self.column(group, labels, label, cell) for label, cell in chosen]
@@ -253,6 +255,7 @@ class RoutePricer:
                 MAX_LABELS,
                 BACKWARD_LABELS,
                 False,
+                self.stop,
             )
             if complete:
                 return ahead, fuel, bound, labels, cutoff

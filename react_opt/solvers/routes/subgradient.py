@@ -101,7 +101,8 @@ class DualAscent:
         pricer, used = self.generation.pricer, np.zeros(self.n)
         lowest = np.full(groups, -np.inf)
         beam = pricer.price(duals, NO_SIDE_PRICES, width=BEAM, columns=1, floor=lowest)
-        floor = beam.top + 1e-9 * np.maximum(1.0, np.abs(beam.top))
+        floor, known = lowest.copy(), np.isfinite(beam.top)  # unknown where the pass was given up at the deadline
+        floor[known] = beam.top[known] + 1e-9 * np.maximum(1.0, np.abs(beam.top[known]))
         exact = pricer.price(duals, NO_SIDE_PRICES, columns=1, floor=floor)
         self.standing.budget.spend(2)
         best: dict[int, Column] = {column.group: column for column in beam.columns}
