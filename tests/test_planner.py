@@ -226,10 +226,18 @@ def test_a_monolith_that_cannot_be_built_in_time_is_not_begun(options, monkeypat
     # Building it cannot be interrupted: begun with half a second left, one of a million columns took half a minute.
     monkeypatch.setattr(oros, "BUILD_S", 1.0)
     monkeypatch.setattr(oros, "solve_monolith", None)
+    given_s = []
+
+    def improve(problem, routes, *, deadline, **_):
+        given_s.append(deadline - time.perf_counter())
+        return routes
+
+    monkeypatch.setattr(oros, "improve", improve)
     instance = parse(walled_grid(3, 3, 2, 8, seed=1))
     plan = solve(instance, time_limit_s=20.0, **options)
     assert (plan.claim.status, plan.claim.limit) == ("feasible", "time")
     assert plan.claim.settings["monolith"].startswith("not built")
+    assert given_s[0] > 1.0  # the time is the primal search's instead
     assert check(instance, plan).ok
 
 

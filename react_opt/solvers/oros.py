@@ -264,9 +264,10 @@ def _monolith(search: Search) -> None:
         return
     if left_s is not None and BUILD_S * columns > left_s:
         search.settings["monolith"] = f"not built: about {columns} columns, too many for {left_s:.2g} s"
+        _improve(search, 0.9 * left_s)
         search.limit = "time"
         return
-    _improve(search)
+    _improve(search, IMPROVE_S if left_s is None else min(IMPROVE_S, IMPROVE_SHARE * left_s))
     known, constant = search.best, search.constant
     objective = None if known is None else known[0] + constant
     request = Request(
@@ -294,18 +295,16 @@ def _monolith(search: Search) -> None:
         search.infeasible = f"fleet: the {solver} solver proved that no plan keeps all limits together"
 
 
-def _improve(search: Search) -> None:
-    """Give the monolith a better plan to start from, for a small part of the time or work there is."""
+def _improve(search: Search, longest_s: float) -> None:
+    """Give the monolith a better plan to start from, in a part of the time or work there is."""
     known, options = search.best, search.options
     if known is None or search.frozen is not None:
         return
-    left_s = options.left_s()
-    share_s = IMPROVE_S if left_s is None else min(IMPROVE_S, IMPROVE_SHARE * left_s)
     steady = options.work_limit is not None
     better = improve(
         search.problem,
         known[1],
-        deadline=None if steady else time.perf_counter() + share_s,
+        deadline=None if steady else time.perf_counter() + longest_s,
         work_limit=IMPROVE_WORK if steady else None,
         seed=options.seed,
         should_stop=options.should_stop,
