@@ -226,16 +226,16 @@ def huge_numbers(case: Data, plan: Data) -> None:
 
 def huge_energies(case: Data, plan: Data) -> None:
     for robot in case["robots"]:
-        robot |= {"idle_w": 1.7e308, "sensing_w": 1.7e308, "battery_j": 1.7e308, "capacity_j": 1.7e308}
-    case["chargers"][0]["power_w"] = 1.7e308
+        robot |= {"idle_w": 1e30, "sensing_w": 1e30, "battery_j": 1e30, "capacity_j": 1e30}
+    case["chargers"][0]["power_w"] = 1e30
     for row in rows(plan, 0):
-        row["charging_j"] = 1.7e308
+        row["charging_j"] = 1e30
 
 
 def huge_weights_and_sigma(case: Data, plan: Data) -> None:
-    case["objective"]["sigma"] = 1.7e308
+    case["objective"]["sigma"] = 1e30
     for cell in case["cells"]:
-        cell["weight"] = 1.7e308
+        cell["weight"] = 1e30
     plan["claim"] |= {"bound": -1.7e308, "objective": 1.7e308, "gap": 1.7e308}
 
 
