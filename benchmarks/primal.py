@@ -10,9 +10,9 @@ import time
 
 from benchmarks.families import metric_complete, walled_grid
 from react_opt.instance import OrosInstance
+from react_opt.models.replay import feasible, value
 from react_opt.route_problem import Route
 from react_opt.solvers.routes.greedy import greedy
-from react_opt.solvers.routes.replay import feasible, value
 from react_opt.solvers.routes.search import improve
 from react_opt.timegraph import route_problem
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from families import metric_complete, walled_grid
 
 from react_opt.instance import OrosInstance
-from react_opt.solvers.routes.engine import RoutesResult, solve_routes
+from react_opt.solvers.routes.engine import solve_routes
+from react_opt.solvers.routes.result import RoutesResult
 from react_opt.timegraph import route_problem
 
 

@@ -19,8 +19,9 @@ from react_opt.replan import Frozen, freeze
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.monolith import solve_monolith
 from react_opt.solvers.outcome import Request
-from react_opt.solvers.routes.engine import solve_routes, unpriced
+from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.greedy import InfeasibleRobot, greedy
+from react_opt.solvers.routes.result import unpriced
 from react_opt.solvers.routes.search import improve
 from react_opt.timegraph import route_problem
 

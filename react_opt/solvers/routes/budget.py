@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.models.replay import feasible, tidy, value
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.routes.bounds import Lattice, tolerance
-from react_opt.solvers.routes.replay import feasible, tidy, value
 
 Limit = Literal["time", "work", "interrupt", "none"]
 OnProgress = Callable[[float, float | None, float | None], None]

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes.background import beside
-from react_opt.solvers.routes.budget import Budget, Limit, OnProgress, Standing, stopping
+from react_opt.solvers.routes.budget import Budget, OnProgress, Standing, stopping
 from react_opt.solvers.routes.certificate import certificate
 from react_opt.solvers.routes.columns import Column
 from react_opt.solvers.routes.cuts import separate
@@ -21,7 +20,9 @@ from react_opt.solvers.routes.generation import Generation
 from react_opt.solvers.routes.greedy import greedy
 from react_opt.solvers.routes.master import Master
 from react_opt.solvers.routes.memory import Memory, fewest_steps
-from react_opt.solvers.routes.pricing import RoutePricer, route_column
+from react_opt.solvers.routes.pricing import RoutePricer
+from react_opt.solvers.routes.result import RoutesResult, Status, unpriced
+from react_opt.solvers.routes.routecolumn import route_column
 from react_opt.solvers.routes.rows import violated_limits
 from react_opt.solvers.routes.search import improve
 from react_opt.solvers.routes.selection import select
@@ -35,53 +36,6 @@ MANY_CELLS = 150
 PRIMAL_SHARE = 0.05
 FIRST_SEARCH_S = 0.004  # per cell
 FIRST_SEARCH_WORK = 20
-Status = Literal["optimal", "feasible", "infeasible", "no_plan", "not_priced"]
-
-
-@dataclass(frozen=True)
-class RoutesResult:
-    """What the decomposition found and knows.
-
-    Parameters
-    ----------
-    routes
-        One route per robot, classes in order; None if no plan was found.
-    objective, bound
-        Value of the plan and proven bound on every plan; None where unknown.
-    status
-        ``optimal``, ``feasible``, ``infeasible`` (proven), ``no_plan``, or ``not_priced``: the instance has an
-        option that the decomposition cannot price.
-    limit
-        What stopped it.
-    certificate
-        What recomputes the bound (see ``docs/decomposition.md``); empty if there is none.
-    iterations
-        Units of work done: pricings, linear programmes, iterations of the primal search.
-    notes
-        How the bound came about and what was not possible, in words.
-    """
-
-    routes: list[Route] | None
-    objective: float | None
-    bound: float | None
-    status: Status
-    limit: Limit
-    certificate: dict[str, Any] = field(default_factory=dict)
-    iterations: int = 0
-    notes: tuple[str, ...] = ()
-
-
-def unpriced(problem: RouteProblem) -> str | None:
-    """Return why the decomposition cannot price a problem, None if it can.
-
-    Parameters
-    ----------
-    problem
-        The route problem.
-    """
-    if problem.charger_j.any():
-        return "chargers are not priced by the route decomposition"
-    return None
 
 
 def solve_routes(

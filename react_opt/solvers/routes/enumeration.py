@@ -17,19 +17,8 @@ from numpy.typing import NDArray
 from react_opt.kernels import kernel
 from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut
-from react_opt.solvers.routes.labels import (
-    NEVER,
-    ORIGIN,
-    WAIT,
-    Fuel,
-    Graph,
-    Labels,
-    MaskArray,
-    Prices,
-    at_most,
-    completed,
-    lowest_bit,
-)
+from react_opt.solvers.routes.labels import at_most, completed, lowest_bit
+from react_opt.solvers.routes.labelstore import NEVER, ORIGIN, WAIT, Fuel, Graph, Labels, MaskArray, Prices
 from react_opt.solvers.routes.pricing import NO_SIDE_PRICES, RoutePricer, SidePrices
 
 _ZERO = np.uint64(0)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from react_opt.models.replay import coupling_faults, feasible
 from react_opt.route_problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.beam import Response, affordable_width, best_response, needed_battery
 from react_opt.solvers.routes.crowding import most_placed
-from react_opt.solvers.routes.replay import coupling_faults, feasible
 from react_opt.solvers.routes.residual import leftover
 
 _WIDTH = 64

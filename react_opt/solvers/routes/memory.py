@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
 from react_opt.route_problem import IntArray, Route, RouteProblem
-from react_opt.solvers.routes.labels import MaskArray, SmallInts
+from react_opt.solvers.routes.labelstore import MaskArray, SmallInts
 
 WORD_BITS = 64
 

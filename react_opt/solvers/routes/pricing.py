@@ -12,17 +12,10 @@ from react_opt.errors import UsageError
 from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
 from react_opt.solvers.routes.columns import Column, Duals, Priced, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
-from react_opt.solvers.routes.labels import (
-    NEVER,
-    Fuel,
-    Graph,
-    Labels,
-    Prices,
-    flat_values,
-    grow_labels,
-    trace,
-)
+from react_opt.solvers.routes.labels import flat_values, grow_labels, trace
+from react_opt.solvers.routes.labelstore import NEVER, Fuel, Graph, Labels, Prices
 from react_opt.solvers.routes.memory import Memory
+from react_opt.solvers.routes.routecolumn import route_column
 
 MAX_LABELS = 20_000_000
 COARSE_SIZE = 8
@@ -397,37 +390,6 @@ def _lowest_point(function: Callable[[float], float], guess: float, top: float) 
         else:
             low = left
     return 0.5 * (low + high)
-
-
-def route_column(problem: RouteProblem, route: Route) -> Column:
-    """Return the column of a route: its cells in order of collection and its exact value.
-
-    Parameters
-    ----------
-    problem
-        The route problem.
-    route
-        A route; sensing the same cell twice counts twice (a relaxation that only pricing produces).
-    """
-    data = problem.classes[route.robot_class]
-    instants = np.arange(data.start_step, problem.horizon + 1)
-    sensed = route.cell[route.sense]
-    coverage = float(problem.reward[sensed, instants[route.sense]].sum())
-    return Column(
-        route.robot_class,
-        coverage + problem.sigma * end_battery(problem, route),
-        tuple(int(c) for c in sensed),
-        route,
-    )
-
-
-def end_battery(problem: RouteProblem, route: Route) -> float:
-    """Return the battery at the horizon after a route, J."""
-    data = problem.classes[route.robot_class]
-    started = route.arc[route.arc >= 0]
-    waits = len(route.cell) - 1 - int(problem.arc_steps[started].sum())
-    spent = float(problem.arc_energy_j[started].sum()) + waits * data.wait_j
-    return data.battery_j - spent - data.sense_j * int(route.sense.sum()) + float(route.charge_j.sum())
 
 
 def _no_labels() -> Labels:

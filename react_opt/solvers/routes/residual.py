@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
+from react_opt.models.replay import first_sensed
 from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
-from react_opt.solvers.routes.replay import first_sensed
 
 Mask = NDArray[np.bool_]
 

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from react_opt.models.replay import coupling_faults, feasible, tidy, value
 from react_opt.route_problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.anneal import anneal
 from react_opt.solvers.routes.beam import affordable_width, battery_can_bind, best_response
 from react_opt.solvers.routes.greedy import route_classes
 from react_opt.solvers.routes.moves import Tables
-from react_opt.solvers.routes.replay import coupling_faults, feasible, tidy, value
 from react_opt.solvers.routes.sequences import SequenceModel, applies, decode, encode, sequence_model
 
 _DEFAULT_WORK = 100

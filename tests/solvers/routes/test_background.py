@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from primal_cases import random_problem
 
+from react_opt.models.replay import feasible, value
 from react_opt.solvers.routes import background
 from react_opt.solvers.routes.background import beside
 from react_opt.solvers.routes.budget import Budget, Standing
 from react_opt.solvers.routes.greedy import greedy
-from react_opt.solvers.routes.replay import feasible, value
 from react_opt.solvers.routes.search import improve
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from primal_cases import all_routes, best_value, random_problem
 
+from react_opt.models.replay import feasible, value
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.routes.beam import best_response
-from react_opt.solvers.routes.replay import feasible, value
 
 
 def _others(problem: RouteProblem, rng: np.random.Generator) -> list[Route] | None:

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from route_brute import brute_force, random_problem
 
+from react_opt.models.replay import feasible, value
 from react_opt.solvers.routes.bounds import Lattice, tolerance
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.memory import Memory, fewest_steps
-from react_opt.solvers.routes.replay import feasible, value
 
 
 @pytest.mark.parametrize("block", range(8))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from primal_cases import all_routes, random_problem
 
+from react_opt.models.replay import coupling_faults, feasible, value
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.routes.greedy import Greedy, InfeasibleRobot, greedy, route_classes
-from react_opt.solvers.routes.replay import coupling_faults, feasible, value
 
 
 def _plan_exists(problem: RouteProblem) -> bool:

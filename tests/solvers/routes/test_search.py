@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from primal_cases import all_routes, best_value, random_problem
 
+from react_opt.models.replay import feasible, tidy, value
 from react_opt.route_problem import RobotClass, Route, RouteProblem
 from react_opt.solvers.routes.greedy import greedy, route_classes
-from react_opt.solvers.routes.replay import feasible, tidy, value
 from react_opt.solvers.routes.search import improve
 from react_opt.solvers.routes.sequences import applies, decode, encode, sequence_model
 
