@@ -96,6 +96,10 @@ def solve(
     )
     if solver is not None:
         backend(solver)  # bad options are refused at once, not after a first use has compiled its kernels
+    if isinstance(instance, OrosInstance):
+        from react_opt.solvers.oros import require_start
+
+        require_start(instance, start, at_step)
     recipe = _recipe_of(instance)  # neither importing nor compiling it counts against the time limit
     warm_s = warm_up(instance.kind, recipe)
     options = replace(options, begun=time.perf_counter())

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from react_opt.models.readback import battery
+from react_opt.models.replay import battery
 from react_opt.route_problem import FloatArray, IntArray, RobotClass, Route, RouteProblem
 
 
@@ -116,7 +116,7 @@ def _head(problem: RouteProblem, group: RobotClass, robot: int, route: Route, at
     while route.cell[k] < 0:
         k += 1
     late = group.start_step + k > at_step  # it arrives later: whether it senses there is free
-    level, _ = battery(problem, route)
+    level = battery(problem, route)
     left_j = float(level[k]) + (group.sense_j if late and route.sense[k] else 0.0)
     sense = route.sense[: k + 1].copy()
     if late:

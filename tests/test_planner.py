@@ -252,3 +252,26 @@ def test_building_the_monolith_counts_against_its_time_limit(monkeypatch):
     monkeypatch.setattr(monolith, "perf_counter", lambda: next(clock))
     monolith.solve_monolith(star(), route_problem(star()), "highs", Request(time_limit_s=10.0), None)
     assert backend.limit_s == 7.0
+
+
+@pytest.mark.parametrize("seed", range(0, 60))
+def test_the_relaxation_bound_holds(seed):
+    from react_opt.claims import relaxation_bound
+    from react_opt.models.readback import explored_value
+    from react_opt.timegraph import route_problem
+
+    instance = random_oros(seed)
+    plan = solve(instance, method="monolith", threads=1)
+    if plan.robots:
+        assert relaxation_bound(route_problem(instance)) + explored_value(instance) >= plan.objective.total - 1e-9
+
+
+def test_the_relaxation_bound_counts_places_and_sensings():
+    from react_opt.claims import relaxation_bound
+    from react_opt.timegraph import route_problem
+
+    # One robot senses one cell an instant: 4 + 3 + 2 of three cells; 100 J less 4 of waiting are left at most.
+    assert relaxation_bound(route_problem(star())) == pytest.approx(4 + 3 + 2 + 96 / 101)
+    # 7 J less 4 of waiting hold one sensing of 2 J.
+    robots = [{"id": "r", "start": "hub", "battery_j": 7.0, "capacity_j": 7.0, "idle_w": 1.0, "sensing_w": 2.0}]
+    assert relaxation_bound(route_problem(star(robots=robots))) == pytest.approx(4 + 3 / 8)

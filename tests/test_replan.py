@@ -5,7 +5,8 @@ from strategies import random_oros
 
 from react_opt import check, solve
 from react_opt.errors import InputError, UsageError
-from react_opt.models.readback import routes_of, value
+from react_opt.models.readback import routes_of
+from react_opt.models.replay import value
 from react_opt.replan import freeze
 from react_opt.timegraph import route_problem
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from react_opt.instance import OrosInstance
+from react_opt.models.replay import battery, coverage, first_sensed
 from react_opt.plan import Explored, OrosPlan, OrosPlanObjective, OrosRobotPlan, OrosStep
-from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
+from react_opt.route_problem import FloatArray, Route, RouteProblem
 
 
 def explored_value(instance: OrosInstance) -> float:
@@ -19,72 +20,6 @@ def explored_value(instance: OrosInstance) -> float:
         for cell in instance.cells
         if cell.explored
     )
-
-
-def tidy(problem: RouteProblem, routes: Sequence[Route]) -> list[Route]:
-    """Return the routes without sensing that earns nothing; charging never lifts a battery above its capacity.
-
-    Of the robots that sense a cell first, the one that comes first in ``routes`` keeps it. The value never
-    falls: a sensing dropped saves its energy.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    routes
-        One route per robot, class by class.
-    """
-    first = _first_sensed(problem, routes)
-    taken = np.zeros(problem.n_cells, dtype=bool)
-    result = []
-    for route in routes:
-        group = problem.classes[route.robot_class]
-        at = np.arange(len(route.cell)) + group.start_step
-        sense = route.sense & (route.cell >= 0)
-        cells = np.where(sense, route.cell, 0)
-        sense &= (first[cells] == at) & (problem.reward[cells, at] > 0)
-        for k in np.flatnonzero(sense):
-            sense[k] = not taken[route.cell[k]]
-            taken[route.cell[k]] = True
-        charge = route.charge_j.copy()
-        _, charge = battery(problem, Route(route.robot_class, route.cell, route.arc, sense, charge))
-        result.append(Route(route.robot_class, route.cell, route.arc, sense, charge))
-    return result
-
-
-def battery(problem: RouteProblem, route: Route) -> tuple[FloatArray, FloatArray]:
-    """Return ``b[r,t]`` of a route and its charging, clipped where the battery is full, both J.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    route
-        The route.
-    """
-    group = problem.classes[route.robot_class]
-    level, charge = np.empty(len(route.cell)), route.charge_j.copy()
-    now = group.battery_j
-    for k in range(len(route.cell)):
-        if k > 0:
-            if route.arc[k - 1] >= 0:
-                now -= problem.arc_energy_j[route.arc[k - 1]]
-            elif route.cell[k - 1] >= 0:
-                now -= group.wait_j
-        used = group.sense_j if route.sense[k] else 0.0
-        if charge[k] > 0:
-            charge[k] = max(0.0, min(charge[k], group.capacity_j - (now - used)))
-        now += charge[k] - used
-        level[k] = now
-    return level, charge
-
-
-def value(problem: RouteProblem, routes: Sequence[Route]) -> float:
-    """Return the objective of routes without what explored cells earn; see :func:`explored_value`."""
-    first = _first_sensed(problem, routes)
-    cells = np.flatnonzero(first <= problem.horizon)
-    left_j = sum(float(battery(problem, route)[0][-1]) for route in routes)
-    return float(np.maximum(problem.reward[cells, first[cells]], 0.0).sum()) + problem.sigma * left_j
 
 
 def fill_plan(instance: OrosInstance, problem: RouteProblem, routes: Sequence[Route], plan: OrosPlan) -> OrosPlan:
@@ -107,13 +42,11 @@ def fill_plan(instance: OrosInstance, problem: RouteProblem, routes: Sequence[Ro
     left_j = 0.0
     for index, robot in enumerate(instance.robots):
         route = by_robot[index]
-        level, _ = battery(problem, route)
+        level = battery(problem, route)
         left_j += float(level[-1])
         robots.append(OrosRobotPlan(id=robot.id, steps=_steps(instance, problem, route, level)))
         explored += [(int(route.cell[k]), robot.start_step + int(k), robot.id) for k in np.flatnonzero(route.sense)]
-    first = _first_sensed(problem, routes)
-    cells = np.flatnonzero(first <= problem.horizon)
-    coverage = float(np.maximum(problem.reward[cells, first[cells]], 0.0).sum()) + explored_value(instance)
+    covered = coverage(problem, first_sensed(problem, routes)) + explored_value(instance)
     weighted = problem.sigma * left_j
     return plan.model_copy(
         update={
@@ -123,7 +56,7 @@ def fill_plan(instance: OrosInstance, problem: RouteProblem, routes: Sequence[Ro
                 for i, t, r in sorted(explored, key=lambda x: (x[1], x[0]))
             ),
             "objective": OrosPlanObjective(
-                coverage=coverage, battery=weighted, battery_j=left_j, total=coverage + weighted
+                coverage=covered, battery=weighted, battery_j=left_j, total=covered + weighted
             ),
         }
     )
@@ -173,14 +106,6 @@ def _arc_index(instance: OrosInstance, problem: RouteProblem) -> dict[int, int]:
         if a is not None:
             result[index] = a
     return result
-
-
-def _first_sensed(problem: RouteProblem, routes: Sequence[Route]) -> IntArray:
-    first = np.full(problem.n_cells, problem.horizon + 1, dtype=np.int64)
-    for route in routes:
-        k = np.flatnonzero(route.sense & (route.cell >= 0))
-        np.minimum.at(first, route.cell[k], k + problem.classes[route.robot_class].start_step)
-    return first
 
 
 def _steps(instance: OrosInstance, problem: RouteProblem, route: Route, level: FloatArray) -> tuple[OrosStep, ...]:

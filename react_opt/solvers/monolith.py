@@ -9,7 +9,7 @@ from time import perf_counter
 from react_opt.instance import OrosInstance
 from react_opt.models.oros import OrosModel, oros_model
 from react_opt.models.program import FloatArray, Program
-from react_opt.models.readback import tidy
+from react_opt.models.replay import tidy
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.outcome import Outcome, Request
 from react_opt.solvers.registry import backend

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from react_opt.certify import check
-from react_opt.claims import instance_ref, optimality_tolerance, relaxation_bound, versions
-from react_opt.errors import InputError, ReactError, UsageError
+from react_opt.claims import optimality_tolerance, relaxation_bound
+from react_opt.errors import InputError, UsageError
 from react_opt.instance import OrosInstance
 from react_opt.models.oros import column_count
-from react_opt.models.readback import explored_value, fill_plan, routes_of, tidy, value
+from react_opt.models.readback import explored_value, routes_of
 from react_opt.options import SolveOptions
-from react_opt.plan import Claim, OrosPlan, Plan, gap_of
-from react_opt.replan import Frozen, freeze
-from react_opt.route_problem import Route, RouteProblem
+from react_opt.plan import Claim, OrosPlan, Plan
+from react_opt.replan import freeze
+from react_opt.route_problem import RouteProblem
 from react_opt.solvers.monolith import solve_monolith
+from react_opt.solvers.oros_answer import answer, without_plan
+from react_opt.solvers.oros_search import Search, proven
 from react_opt.solvers.outcome import Request
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.greedy import InfeasibleRobot, greedy
@@ -29,55 +29,10 @@ MAX_ENTRIES = 150_000_000  # cells x steps of the reward profile: about 5 GB whi
 MAX_PLAN_STEPS = 5_000_000  # rows of a plan file
 MAX_COLUMNS = 4_000_000  # of the monolith
 BUILD_S = 1e-5  # per column of the monolith, to build it and hand it to a solver: neither can be interrupted
+GREEDY_S = 2.0  # granted to the greedy plan where the deadline is nearer
 COUPLED_SHARE = 0.3  # of the time, for the decomposition where there are limits between robots
 COUPLED_S, SMALL_COLUMNS = 1.0, 50_000  # at most so long where the monolith is small
 IMPROVE_S, IMPROVE_SHARE, IMPROVE_WORK = 1.0, 0.05, 20  # primal search before the monolith
-
-
-@dataclass
-class Search:
-    """What is known while an instance is being solved.
-
-    ``candidates`` are (value, routes), routes class by class; ``bound`` is proven; both without ``constant``,
-    what cells explored from the start earn.
-    """
-
-    instance: OrosInstance
-    options: SolveOptions
-    problem: RouteProblem
-    constant: float
-    bound: float
-    frozen: Frozen | None = None
-    at_step: int | None = None
-    candidates: list[tuple[float, list[Route]]] = field(default_factory=list)
-    limit: str = "none"
-    infeasible: str | None = None
-    method: str = ""
-    solver: str = ""
-    packages: tuple[str, ...] = ("numpy", "scipy", "numba")
-    settings: dict[str, Any] = field(default_factory=dict)
-    certificate: dict[str, Any] | None = None
-    wall_s: dict[str, float] = field(default_factory=dict)
-
-    def offer(self, routes: Sequence[Route]) -> None:
-        """Add routes of the whole problem as a candidate."""
-        kept = tidy(self.problem, routes)
-        self.candidates.append((value(self.problem, kept), kept))
-
-    @property
-    def best(self) -> tuple[float, list[Route]] | None:
-        """The best candidate; of equals the first."""
-        return max(self.candidates, key=lambda candidate: candidate[0], default=None)
-
-    def progress(self, elapsed_s: float, incumbent: float | None, bound: float | None) -> None:
-        """Report in the instance's own objective, never worse than what is known."""
-        if self.options.on_progress is None:
-            return
-        known = self.best
-        values = [v for v in (incumbent, known[0] + self.constant if known else None) if v is not None]
-        bounds = [v for v in (bound, self.bound + self.constant) if v is not None]
-        elapsed_s = time.perf_counter() - self.options.begun
-        self.options.on_progress(elapsed_s, max(values, default=None), min(bounds))
 
 
 def solve_oros(
@@ -88,20 +43,28 @@ def solve_oros(
     rows = sum(instance.horizon_steps + 1 - robot.start_step for robot in instance.robots)
     if entries > MAX_ENTRIES or rows > MAX_PLAN_STEPS:
         reason = f"memory: {entries} cells x steps (at most {MAX_ENTRIES}), {rows} plan rows (at most {MAX_PLAN_STEPS})"
-        return _without_plan(instance, options, Claim(status="no_plan", limit="memory", reason=reason))
+        return without_plan(instance, options, Claim(status="no_plan", limit="memory", reason=reason))
+    require_start(instance, start, at_step)
     search = _begin(instance, options, start, at_step)
     search.wall_s["build"] = time.perf_counter() - options.begun
     _timed(search, "greedy", _greedy)
-    if search.infeasible is None and not _proven(search):
+    if search.infeasible is None and not proven(search):
         _timed(search, "solve", _choose(search))
-    return _finish(search)
+    return answer(search)
 
 
-def _begin(instance: OrosInstance, options: SolveOptions, start: Plan | None, at_step: int | None) -> Search:
-    problem = route_problem(instance)
-    search = Search(instance, options, problem, explored_value(instance), relaxation_bound(problem))
+def require_start(instance: OrosInstance, start: Plan | None, at_step: int | None) -> None:
+    """Refuse a plan to start from that is none of this instance, and a step outside its horizon.
+
+    Raises
+    ------
+    InputError
+        Where the plan has another kind, breaks a rule or holds no robots.
+    UsageError
+        Where the step lies outside the horizon.
+    """
     if start is None:
-        return search
+        return
     if not isinstance(start, OrosPlan):
         raise InputError.single("<start>", "kind", f"expected an oros_plan, found {start.kind!r}")
     found = check(instance, start)
@@ -109,11 +72,19 @@ def _begin(instance: OrosInstance, options: SolveOptions, start: Plan | None, at
         raise InputError.single("<start>", "", f"expected a valid plan of this instance: {found.violations[0]}")
     if not start.robots and instance.robots:
         raise InputError.single("<start>", "robots", "expected a plan to start from, found none")
+    if at_step is not None and not 0 <= at_step <= instance.horizon_steps:
+        raise UsageError(f"at step: expected 0 to {instance.horizon_steps}, found {at_step}")
+
+
+def _begin(instance: OrosInstance, options: SolveOptions, start: Plan | None, at_step: int | None) -> Search:
+    problem = route_problem(instance)
+    search = Search(instance, options, problem, explored_value(instance), relaxation_bound(problem))
+    if start is None:
+        return search
+    assert isinstance(start, OrosPlan)
     routes = routes_of(instance, problem, start)
     search.offer(routes)
     if at_step is not None:
-        if not 0 <= at_step <= instance.horizon_steps:
-            raise UsageError(f"at step: expected 0 to {instance.horizon_steps}, found {at_step}")
         search.at_step = at_step
         search.frozen = freeze(problem, routes, at_step)
         search.bound = search.frozen.earned + relaxation_bound(search.frozen.problem)
@@ -130,7 +101,9 @@ def _greedy(search: Search) -> None:
     """Put a plan in hand before any solver starts."""
     if search.candidates:
         return
-    found = greedy(search.problem, seed=search.options.seed)
+    latest = search.options.deadline
+    until = None if latest is None else max(latest, time.perf_counter() + GREEDY_S)
+    found = greedy(search.problem, until, seed=search.options.seed)
     if isinstance(found.reason, InfeasibleRobot):
         robot = search.instance.robots[found.reason.robot].id
         search.infeasible = f"robot {robot}: {found.reason.rule}: {found.reason.text}"
@@ -140,22 +113,6 @@ def _greedy(search: Search) -> None:
     else:
         search.settings["greedy"] = found.reason
     search.progress(0.0, None, None)
-
-
-def _proven(search: Search) -> bool:
-    """Whether the gap that was asked for is reached."""
-    known = search.best
-    if known is None:
-        return False
-    objective = known[0] + search.constant
-    return _optimal(search) or search.bound - known[0] <= (search.options.gap or 0.0) * abs(objective)
-
-
-def _optimal(search: Search) -> bool:
-    known = search.best
-    if known is None:
-        return False
-    return search.bound - known[0] <= optimality_tolerance(known[0] + search.constant, search.problem.sigma)
 
 
 def _choose(search: Search) -> Any:
@@ -192,12 +149,14 @@ def _routes_then_monolith(search: Search) -> None:
     coupled = _coupled(search.problem)
     _routes(search, _until(search) if coupled else None)
     ended = coupled or search.limit == "none"
-    if _proven(search) or not ended or search.infeasible is not None or search.options.stopped():
+    if proven(search) or not ended or search.infeasible is not None or search.options.stopped():
         return
     cause = "limits between robots kept it from a proof" if coupled else "it ended without a proof"
     search.method = f"routes, then monolith: {cause}"
     search.settings["routes"] = {"solver": search.solver, "limit": search.limit}
     _monolith(search)
+    if "monolith" in search.settings:
+        search.method = f"routes: {cause}, and the monolith was {search.settings['monolith']}"
 
 
 def _until(search: Search) -> float | None:
@@ -318,79 +277,3 @@ def _check_reserve_s(search: Search) -> float:
     """Seconds to keep for reading the plan back and replaying it, about 3 microseconds per row and a margin."""
     rows = sum(search.problem.horizon + 1 - group.start_step for group in search.problem.classes for _ in group.robots)
     return 0.01 + 2e-5 * rows
-
-
-def _finish(search: Search) -> OrosPlan:
-    """Return the best candidate that the checker accepts."""
-    begun = time.perf_counter()
-    options = search.options
-    rejected: list[str] = []
-    for worth, routes in sorted(search.candidates, key=lambda candidate: -candidate[0]):
-        plan = fill_plan(search.instance, search.problem, routes, _shell(search, worth, rejected))
-        found = check(search.instance, plan)
-        if found.ok:
-            wall_s = {**search.wall_s, "check": time.perf_counter() - begun}
-            return plan.model_copy(update={"claim": plan.claim.model_copy(update={"wall_s": wall_s})})
-        rejected.append(str(found.violations[0]))
-    if rejected:
-        raise ReactError(f"no plan passed the checker; please report this: {rejected[0]}")
-    if search.infeasible is not None:
-        claim = Claim(status="infeasible", reason=search.infeasible)
-    else:
-        limit = "interrupt" if options.stopped() else search.limit
-        claim = Claim(status="no_plan", limit=limit, bound=search.bound + search.constant)  # type: ignore[arg-type]
-    return _without_plan(
-        search.instance, options, claim.model_copy(update={"method": search.method, **_common(search)})
-    )
-
-
-def _shell(search: Search, worth: float, rejected: list[str]) -> OrosPlan:
-    """Return a plan with its claim and no robots yet."""
-    objective = worth + search.constant
-    bound = max(search.bound + search.constant, objective)  # a bound within rounding of the objective
-    slack = optimality_tolerance(objective, search.problem.sigma)
-    false_bound = search.bound + search.constant < objective - max(slack, 1e-9)
-    if false_bound:  # proven wrong by this plan: nothing is known but the relaxation
-        bound = relaxation_bound(search.problem) + search.constant
-        rejected = [*rejected, f"the bound {search.bound + search.constant} is below a checked plan"]
-    optimal = not rejected and bound - objective <= slack
-    common = _common(search)
-    if rejected:
-        common["settings"] = {**common["settings"], "rejected": rejected}
-    if search.options.stopped() and not optimal:
-        common["limit"] = "interrupt"
-    elif not optimal:
-        common["limit"] = search.limit
-    claim = Claim(
-        status="optimal" if optimal else "feasible",
-        objective=objective,
-        bound=bound,
-        gap=gap_of(objective, bound),
-        method=search.method or "greedy: its value meets the relaxation bound",
-        **common,
-    )
-    return OrosPlan(instance=instance_ref(search.instance), claim=claim)
-
-
-def _common(search: Search) -> dict[str, Any]:
-    options = search.options
-    return {
-        "solver": search.solver,
-        "versions": versions(*search.packages),
-        "seed": options.seed,
-        "threads": options.threads,
-        "settings": {
-            "time_limit_s": options.time_limit_s,
-            "work_limit": options.work_limit,
-            "gap": options.gap,
-            **({} if search.at_step is None else {"kept_steps": search.at_step}),
-            **search.settings,
-        },
-        "certificate": search.certificate,
-        "wall_s": dict(search.wall_s),
-    }
-
-
-def _without_plan(instance: OrosInstance, options: SolveOptions, claim: Claim) -> OrosPlan:
-    update = {"seed": options.seed, "threads": options.threads, "versions": claim.versions or versions()}
-    return OrosPlan(instance=instance_ref(instance), claim=claim.model_copy(update=update))

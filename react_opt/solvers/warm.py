@@ -17,7 +17,7 @@ from react_opt.instance import (
 )
 from react_opt.options import SolveOptions
 
-ANNOUNCE_AFTER_S = 4.0  # loading from the cache takes less
+ANNOUNCE_AFTER_S = 6.0  # loading from the cache takes less, but on a busy machine
 _warm: set[str] = set()
 
 
@@ -46,7 +46,7 @@ def warm_up(kind: str, solver: Callable[..., Any]) -> float:
 
 @contextmanager
 def _announced() -> Iterator[None]:
-    text = "compiling kernels for their first use on this machine: a minute or two, cached afterwards"
+    text = "preparing compiled kernels: at their first use on a machine a minute or two, cached afterwards"
     timer = threading.Timer(ANNOUNCE_AFTER_S, logging.getLogger("react_opt").warning, [text])
     timer.daemon = True
     timer.start()

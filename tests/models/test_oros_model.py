@@ -9,7 +9,8 @@ from strategies import random_oros
 from react_opt import parse
 from react_opt.instance import OrosInstance
 from react_opt.models.oros import OrosModel, column_count, opposite_pairs, oros_model
-from react_opt.models.readback import routes_of, tidy, value
+from react_opt.models.readback import routes_of
+from react_opt.models.replay import tidy, value
 from react_opt.planner import solve
 from react_opt.route_problem import Route
 from react_opt.solvers.outcome import Request

@@ -37,7 +37,8 @@ LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing
 COLUMNS = 30  # added per pricing
 MIP_NODES = 2000  # of an integer program under a work limit
 WARM_S, WARM_SHARE, WARM_PORTIONS = 10.0, 0.6, 8  # of local search before the first linear program
-FRESH_EVERY = 25  # portions of such a search
+FRESH_EVERY = 8  # portions of such a search
+DOUBLINGS, LONG_HEAT, LONG_ROOM = 5, 1.0, 1.0  # of the portions where there are many targets
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
 
 
@@ -157,8 +158,16 @@ class Decomposition:
         self.offer(self.searcher.run(iterations))
 
     def _search_on(self) -> None:
+        turn = 0
         while self.control.flag[0] == 0 and self.searcher is not None:
-            self.searcher.run(PORTION)
+            self._anneal(self.searcher, turn)
+            turn += 1
+
+    def _anneal(self, searcher: Searcher, turn: int) -> Routes:
+        """Run a portion; where targets are many they grow and cool slowly, the time left being short or long."""
+        if self.elementary:
+            return searcher.run(PORTION)
+        return searcher.run(PORTION << min(turn, DOUBLINGS), LONG_HEAT, LONG_ROOM)
 
     def _collect(self) -> None:
         if self.searcher is not None:
@@ -277,7 +286,7 @@ class Decomposition:
             while fresh is not None and time.perf_counter() < until and not self.control.stopped():
                 if turn % FRESH_EVERY == 0:  # searches that begin anew, on this thread
                     other = Searcher(self.arrays, fresh, self.seed + 1 + turn, self.control.flag)
-                self.offer(other.run(PORTION))
+                self.offer(self._anneal(other, turn % FRESH_EVERY))
                 turn += 1
             self._collect()
         self._pool()

@@ -2,7 +2,8 @@
 
 Slack induction by string removals (Christiaens and Vanden Berghe 2020), with prizes: a solution need not visit
 every target. Simulated annealing walks on ``value - rate * cost``; what is remembered is the best by value,
-then cost. Nobody waits, so an insertion is judged by two sums.
+then cost. Nobody waits, so an insertion is judged by two sums; the cheapest insertion of a target into a route
+is remembered for as long as that route is kept, since a removal touches few routes.
 """
 
 from __future__ import annotations
@@ -53,6 +54,9 @@ class Searcher:
         mean = np.minimum(arrays.cost[:, :n, :n].min(axis=0, initial=np.inf), 1e15)
         self._near = np.argsort(mean + mean.T - 3e15 * np.eye(n), axis=1, kind="stable")
         self._portion = 0
+        self._into = np.ascontiguousarray(arrays.cost.transpose(0, 2, 1))
+        limit = np.full(len(arrays.time_s), arrays.time_limit_s) if arrays.by_time else arrays.energy_limit_j
+        self._cost_limit = limit.astype(np.float64)
         self._pool = np.full((POOL, n + 1), -1, dtype=np.int64)
         self._pool_robot = np.full(POOL, -1, dtype=np.int64)
         self.seen: set[tuple[int, tuple[int, ...]]] = set()
@@ -67,7 +71,7 @@ class Searcher:
         self.routes = [list(route) for route in routes]
         self._put(routes)
 
-    def run(self, iterations: int, heat: float = 1.0) -> Routes:
+    def run(self, iterations: int, heat: float = 0.3, room: float | None = None) -> Routes:
         """Search for a number of iterations, cooling down once; return the best routes known.
 
         Parameters
@@ -76,20 +80,24 @@ class Searcher:
             Removals and insertions to try.
         heat
             Starting temperature, as a share of what one mean target is worth.
+        room
+            What cost weighs against value, 1 for three tenths of the value per cost known; None for ``RATES`` by
+            turns.
         """
         arrays = self.arrays
         value, cost = arrays.worth(self.routes)
         mean = float(arrays.value.mean()) if len(arrays.value) else 0.0
         rate = 0.3 * value / cost if value > 0 and cost > 0 else 0.0
-        rate *= RATES[self._portion % len(RATES)]  # by turns a search for room and one for value
+        # by turns a search for room and one for value
+        rate *= RATES[self._portion % len(RATES)] if room is None else room
         if value == 0.0:
             rate = 1e-6 * mean
         if iterations > 0 and len(arrays.value):
             search(
                 self._tour, arrays.value, arrays.time_s, arrays.energy_j, arrays.cost, arrays.time_limit_s,
-                arrays.energy_limit_j, self._near, rate, max(1e-9, 0.3 * heat * mean), max(1e-12, 0.002 * mean),
+                arrays.energy_limit_j, self._near, rate, max(1e-9, heat * mean), max(1e-12, 0.002 * mean),
                 iterations, self.seed * 1_000_003 + self._portion, self.stop, self._pool,
-                self._pool_robot,
+                self._pool_robot, self._into, self._cost_limit,
             )  # fmt: skip
         self._portion += 1
         if len(self.seen) < MOST_SEEN:
@@ -133,16 +141,51 @@ def _sums(tour: Any, r: int, size: int, n: int, time_s: Any, energy_j: Any, cost
     return a, b, c
 
 
+@kernel
+def _legs(leg: Any, tour: Any, r: int, size: int, n: int, cost: Any) -> None:
+    before = n
+    for x in range(size + 1):
+        after = tour[r, x] if x < size else n + 1
+        leg[r, x] = cost[r, before, after]
+        before = after
+
+
+@kernel
+def _cheapest(
+    r: int, k: int, tour: Any, size: int, leg: Any, into: Any, time_s: Any, energy_j: Any, cost: Any, room_t: float,
+    room_e: float, room_c: float, least: float, blink: float, random: Any,
+) -> Any:  # fmt: skip
+    """Return cost and place of the cheapest insertion of a target into a route, if cheaper than ``least``."""
+    n, best_x = into.shape[1] - 2, -1
+    before = n
+    for y in range(size + 1):
+        after = tour[r, y] if y < size else n + 1
+        add = into[r, k, before] + cost[r, k, after] - leg[r, y]
+        if (
+            add < least
+            and add <= room_c  # the budget that binds most often, before those that need more memory
+            and time_s[r, before, k] + time_s[r, k, after] - time_s[r, before, after] <= room_t
+            and energy_j[r, before, k] + energy_j[r, k, after] - energy_j[r, before, after] <= room_e
+            and (blink == 0.0 or _uniform(random) >= blink)
+        ):
+            least, best_x = add, y
+        before = after
+    if best_x < 0:
+        return np.inf, -1
+    return least, best_x
+
+
 @kernel(nogil=True)
 def search(
     tour: Any, value: Any, time_s: Any, energy_j: Any, cost: Any, time_limit: float, energy_limit: Any, near: Any,
     rate: float, hot: float, cold: float, iterations: int, seed: int, halt: Any, pool: Any,
-    pool_robot: Any,
+    pool_robot: Any, into: Any, cost_limit: Any,
 ) -> None:  # fmt: skip
     """Improve ``tour`` (in and out: ``(R, N + 1)`` stops per robot, -1 after the last) in place.
 
     Routes of each plan that is better than any before it are written to ``pool`` (rows as in ``tour``) and
-    ``pool_robot`` (-1 after the last).
+    ``pool_robot`` (-1 after the last). ``into`` is ``cost`` with its last axes swapped, ``cost_limit`` ``(R,)`` the
+    budget that ``cost`` draws on.
     """
     random = np.array([seed], np.uint64)
     _uniform(random)
@@ -164,6 +207,11 @@ def search(
     old_robot, old_place = robot.copy(), place.copy()
     old_t, old_e, old_c = used_t.copy(), used_e.copy(), used_c.copy()
     touched = np.zeros(n_robots, np.bool_)
+    leg = np.zeros((n_robots, n + 1))  # cost of each drive of the routes
+    for r in range(n_robots):
+        _legs(leg, tour, r, size[r], n, cost)
+    known = np.zeros((n_robots, n), np.bool_)  # insertions into the routes of ``old_tour``
+    known_add, known_x = np.empty((n_robots, n)), np.empty((n_robots, n), np.int64)
     waiting, rank = np.empty(n, np.int64), np.empty(n)
     cooling = (cold / hot) ** (1.0 / max(1, iterations))
     heat, n_pool, top_score = hot, 0, now_score
@@ -216,6 +264,7 @@ def search(
         for r in range(n_robots):
             if touched[r]:
                 used_t[r], used_e[r], used_c[r] = _sums(tour, r, size[r], n, time_s, energy_j, cost)
+                _legs(leg, tour, r, size[r], n, cost)
         # recreate: every target that waits, in a random order of some kind, at its cheapest place
         n_waiting = 0
         kind = int(_uniform(random) * 4)
@@ -242,19 +291,24 @@ def search(
             k = waiting[x]
             least, best_r, best_x = np.inf, -1, -1
             for r in range(n_robots):
-                room_t, room_e = time_limit - used_t[r], energy_limit[r] - used_e[r]
-                before = n
-                for y in range(size[r] + 1):
-                    after = tour[r, y] if y < size[r] else n + 1
-                    add = cost[r, before, k] + cost[r, k, after] - cost[r, before, after]
-                    if (
-                        add < least
-                        and time_s[r, before, k] + time_s[r, k, after] - time_s[r, before, after] <= room_t
-                        and energy_j[r, before, k] + energy_j[r, k, after] - energy_j[r, before, after] <= room_e
-                        and _uniform(random) >= BLINK
-                    ):
-                        least, best_r, best_x = add, r, y
-                    before = after
+                room_t, room_e, room_c = time_limit - used_t[r], energy_limit[r] - used_e[r], cost_limit[r] - used_c[r]
+                if touched[r]:
+                    add, y = _cheapest(
+                        r, k, tour, size[r], leg, into, time_s, energy_j, cost, room_t, room_e, room_c, least, BLINK,
+                        random,
+                    )  # fmt: skip
+                else:
+                    if not known[r, k]:
+                        known[r, k] = True
+                        known_add[r, k], known_x[r, k] = _cheapest(
+                            r, k, tour, size[r], leg, into, time_s, energy_j, cost, room_t, room_e, room_c, np.inf,
+                            0.0, random,
+                        )  # fmt: skip
+                    add, y = known_add[r, k], known_x[r, k]
+                    if add < least and _uniform(random) < BLINK:
+                        continue
+                if add < least:
+                    least, best_r, best_x = add, r, y
             if best_r < 0 or value[k] <= rate * least - heat:
                 continue
             r = best_r
@@ -271,6 +325,7 @@ def search(
             used_t[r] += time_s[r, before, k] + time_s[r, k, after] - time_s[r, before, after]
             used_e[r] += energy_j[r, before, k] + energy_j[r, k, after] - energy_j[r, before, after]
             used_c[r] += least
+            _legs(leg, tour, r, size[r], n, cost)
         good = True
         for r in range(n_robots):
             if touched[r]:  # anew: sums over absent drives lose their digits
@@ -295,12 +350,14 @@ def search(
             for r in range(n_robots):
                 if touched[r]:
                     old_tour[r] = tour[r]
+                    known[r] = False
             old_size[:], old_robot[:], old_place[:] = size, robot, place
             old_t[:], old_e[:], old_c[:] = used_t, used_e, used_c
         else:
             for r in range(n_robots):
                 if touched[r]:
                     tour[r] = old_tour[r]
+                    _legs(leg, tour, r, old_size[r], n, cost)
             size[:], robot[:], place[:] = old_size, old_robot, old_place
             used_t[:], used_e[:], used_c[:] = old_t, old_e, old_c
             now_value = 0.0

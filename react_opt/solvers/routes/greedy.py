@@ -80,7 +80,7 @@ def proven_infeasible(problem: RouteProblem) -> InfeasibleRobot | None:
         if need == np.inf:
             if group.return_to >= 0:
                 return InfeasibleRobot(
-                    robot, "return_to", f"cannot stand in cell {group.return_to} at instant {problem.horizon}"
+                    robot, "return_to", f"cannot stand where it must return to at instant {problem.horizon}"
                 )
             return InfeasibleRobot(robot, "battery", "its reserve is above what it can charge to")
         if group.battery_j < need - 1e-6 * max(1.0, group.capacity_j):
