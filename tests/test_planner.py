@@ -254,7 +254,7 @@ def test_building_the_monolith_counts_against_its_time_limit(monkeypatch):
     assert backend.limit_s == 7.0
 
 
-@pytest.mark.parametrize("seed", range(0, 60))
+@pytest.mark.parametrize("seed", range(60))
 def test_the_relaxation_bound_holds(seed):
     from react_opt.claims import relaxation_bound
     from react_opt.models.readback import explored_value
