@@ -187,7 +187,9 @@ def _swaps(problem: RouteProblem, routes: Sequence[Route]) -> list[str]:
 
 
 def tidy(problem: RouteProblem, routes: Sequence[Route]) -> list[Route]:
-    """The same movements without sensing that earns less than it costs; chargers may then fill less.
+    """The same movements without sensing that earns nothing; chargers may then fill less.
+
+    Where a robot never charges, sensing that earns less than its energy is worth is dropped too.
 
     Of several robots that sense a cell only the first does (the first in order on ties). A plan that kept every
     limit still does, and is worth at least as much.
@@ -208,7 +210,8 @@ def tidy(problem: RouteProblem, routes: Sequence[Route]) -> list[Route]:
         cells, instants = route.cell[at], at + group.start_step
         earned = problem.reward[cells, instants]
         keep = (first[cells] == instants) & ~taken[cells] & (earned > 0.0)
-        keep &= earned >= problem.sigma * group.sense_j
+        if not route.charge_j.any():  # else what it would save may not fit into the battery later
+            keep &= earned >= problem.sigma * group.sense_j
         taken[cells[keep]] = True
         if keep.all():
             result.append(route)

@@ -212,3 +212,20 @@ def test_tidy_drops_sensing_that_earns_nothing() -> None:
     assert first.sense.tolist() == [False, True, False, False]
     assert not second.sense.any()
     assert value(model.problem, [first, second]) > value(model.problem, twice)
+
+
+@pytest.mark.parametrize("seed", range(0, 200, 5))
+def test_tidy_never_lowers_the_value_of_an_optimum(seed: int) -> None:
+    model = oros_model(random_oros(seed))
+    outcome = backend("highs").solve(model.program, Request())
+    if outcome.x is not None:
+        routes = model.routes(outcome.x)
+        assert value(model.problem, tidy(model.problem, routes)) >= value(model.problem, routes) - 1e-9
+
+
+def test_sensing_that_a_charger_refills_is_kept() -> None:
+    # Sensing costs 1 J worth 10 and earns 3, but the battery is full again either way: the charger gives 8 J a step.
+    robots = [{"id": "p", "start": "a", "battery_j": 9.0, "capacity_j": 9.0, "idle_w": 1.0, "sensing_w": 1.0}]
+    instance = corridor(robots=robots, chargers=[{"cell": "a", "power_w": 8.0}], objective={"sigma": 10.0})
+    plan = solve(instance, method="monolith")
+    assert plan.objective.total == 3 + 90
