@@ -57,7 +57,7 @@ def test_the_product_agrees_with_brute_force(way: str, seed: int, monkeypatch: p
         pytest.skip(str(refused))
     certificate = check(instance, plan)
     assert certificate.violations == ()
-    if way == "routes" and instance.limits.forbid_swaps and plan.claim.status != "optimal":
+    if way == "routes" and instance.limits.forbid_swaps and plan.claim.status in ("feasible", "no_plan"):
         # Swaps are left out of the decomposition's bound, so alone it may end without a proof; auto goes on.
         assert plan.claim.bound is not None
         assert truth(seed) is None or plan.claim.bound >= truth(seed) - 1e-6
