@@ -302,8 +302,21 @@ class Link(Part):
     outages_s: tuple[tuple[NonNegative, NonNegative], ...] = ()
 
 
+class Failure(Part):
+    """A robot that dies at a time, s."""
+
+    robot: Id
+    t_s: NonNegative
+
+
 class Mission(Document):
-    """A closed-loop mission on a map that only the simulator knows."""
+    """A closed-loop mission on a map that only the simulator knows.
+
+    ``switching`` is the rule by which sensors go off: where no pixel would become known (``no_new_pixel``), where
+    less than 0.1 m^2 would per scan (``small_gain``), or in areas that are explored (``area_explored``, the
+    paper's). With ``blocking`` off robots pass through each other. A robot without progress for ``stuck_s``
+    abandons its target.
+    """
 
     kind: Literal["mission"] = "mission"
     map: Annotated[str, Field(strict=True, min_length=1)]
@@ -321,6 +334,10 @@ class Mission(Document):
     postpone_below: NonNegative
     noise: Noise = Noise()
     link: Link | None = None
+    switching: Literal["no_new_pixel", "small_gain", "area_explored"] = "area_explored"
+    blocking: Flag = True
+    stuck_s: Positive = 20.0
+    failures: tuple[Failure, ...] = ()
     seed: Count
 
 

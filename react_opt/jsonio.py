@@ -19,8 +19,9 @@ from react_opt.errors import Fault, InputError
 from react_opt.instance import INSTANCE_KINDS, Document, canonical
 from react_opt.plan import PLAN_KINDS
 from react_opt.references import ReferenceFaultsError, reference_faults
+from react_opt.trace import Trace
 
-KINDS: dict[str, type[BaseModel]] = {**INSTANCE_KINDS, **PLAN_KINDS}
+KINDS: dict[str, type[BaseModel]] = {**INSTANCE_KINDS, **PLAN_KINDS, "trace": Trace}
 STANDARD = "-"
 MAX_FILE_BYTES = 2_000_000_000
 

@@ -167,10 +167,17 @@ def _fleet(data: dict[str, Any]) -> Iterator[Place]:
         )
 
 
+def _mission(data: dict[str, Any]) -> Iterator[Place]:
+    yield from _fleet(data)
+    robots = _ids(data, "robots")
+    for place, row in _rows(data, "failures"):
+        yield from _refers(row, place, "robot", robots, "robot")
+
+
 _RULES: dict[str, Callable[[dict[str, Any]], Iterator[Place]]] = {
     "oros": _oros,
     "assignment": _assignment,
     "inspection": _inspection,
     "fleet": _fleet,
-    "mission": _fleet,
+    "mission": _mission,
 }

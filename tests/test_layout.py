@@ -17,7 +17,7 @@ MOST_LINES = 400
 
 # From the ground up. A part imports from its own layer and from those above it in this list, never from below.
 LAYERS = [
-    {"errors", "references", "instance", "plan", "jsonio", "kernels"},
+    {"errors", "references", "instance", "plan", "trace", "jsonio", "kernels"},
     {"certify", "certify_base", "certify_replay", "certify_robot", "certify_oros", "certify_bound"}
     | {"certify_assignment", "certify_inspection"},
     {"geometry", "energy", "timegraph", "route_problem", "paths", "options", "interrupt", "areas", "passages"},
