@@ -20,7 +20,8 @@ LAYERS = [
     {"errors", "references", "instance", "plan", "trace", "jsonio", "kernels"},
     {"certify", "certify_base", "certify_replay", "certify_robot", "certify_oros", "certify_bound"}
     | {"certify_assignment", "certify_inspection"},
-    {"geometry", "energy", "timegraph", "route_problem", "paths", "options", "interrupt", "areas", "passages"},
+    {"geometry", "energy", "timegraph", "route_problem", "paths", "options", "interrupt", "areas", "passages"}
+    | {"jobs", "jobs_file", "jobs_worker", "jobs_ray"},
     {"models", "claims"},
     {"solvers", "replan", "build"},
     {"planner"},
@@ -33,7 +34,7 @@ CHECKER = LAYERS[1]
 CHECKER_MAY = {"react_opt." + name for name in (LAYERS[0] - {"kernels"}) | CHECKER}
 
 SOLVER_LIBRARIES = {"highspy", "ortools", "cvxpy", "pyscipopt", "pyvrp", "gurobipy", "mip", "pulp"}
-HEAVY = {"cvxpy", "ortools", "highspy", "ompl", "matplotlib", "numba", "scipy", "pyscipopt"}
+HEAVY = {"cvxpy", "ortools", "highspy", "ompl", "matplotlib", "numba", "scipy", "pyscipopt", "ray"}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,77 @@
+"""A file of JSON lines that one process at a time appends to, whole lines only."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping
+from typing import Any, BinaryIO
+
+from react_opt.errors import InputError, UsageError
+
+
+def read_lines(file: str | os.PathLike[str]) -> list[dict[str, Any]]:
+    """Return the lines of a results file; half a line at its end is left out.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, or a line is no JSON object.
+    """
+    name = os.fspath(file)
+    try:
+        with open(name, "rb") as handle:
+            return _parsed(handle.read(), name)
+    except OSError as error:
+        raise InputError.single(name, "", f"cannot be read: {error.strerror or error}") from None
+
+
+@contextlib.contextmanager
+def opened(file: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, list[dict[str, Any]]]]:
+    """Open a results file to append to, alone, and yield it with the lines that it holds.
+
+    Raises
+    ------
+    UsageError
+        Where another process has it open.
+    InputError
+        Where it cannot be read or written, or a line is no JSON object.
+    """
+    name = os.fspath(file)
+    try:
+        handle = open(name, "a+b", buffering=0)  # noqa: SIM115  (closed below)
+    except OSError as error:
+        raise InputError.single(name, "", f"cannot be written: {error.strerror or error}") from None
+    with handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise UsageError(f"{name}: another process is working on it") from None
+        handle.seek(0)
+        content = handle.read()
+        lines = _parsed(content, name)
+        handle.truncate(content.rfind(b"\n") + 1)
+        yield handle, lines
+
+
+def append(handle: BinaryIO, line: Mapping[str, Any]) -> None:
+    """Append one line in one write, and see that it is on the disk."""
+    data = json.dumps(line, allow_nan=False).encode() + b"\n"
+    while data:  # a full disk may take part of it, the rest of which is cut off when the file is opened again
+        data = data[handle.write(data) :]
+    os.fsync(handle.fileno())
+
+
+def _parsed(content: bytes, name: str) -> list[dict[str, Any]]:
+    lines = []
+    for number, line in enumerate(content[: content.rfind(b"\n") + 1].splitlines(), start=1):
+        try:
+            data = json.loads(line)
+        except ValueError:
+            data = None
+        if not isinstance(data, dict):
+            raise InputError.single(name, f"line {number}", "expected a JSON object")
+        lines.append(data)
+    return lines

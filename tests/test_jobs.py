@@ -1,0 +1,136 @@
+"""Jobs in processes of their own: limits, deaths, and going on where a run was stopped."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib import util
+from pathlib import Path
+
+import pytest
+
+from react_opt.errors import InputError, MissingPartError, UsageError
+from react_opt.jobs import Job, Record, run_jobs
+from react_opt.jobs_file import opened, read_lines
+
+HERE = "job_targets"
+
+
+def test_results_come_back_in_the_order_of_the_jobs_each_from_its_own_process(tmp_path: Path) -> None:
+    jobs = [Job(f"n{k}", f"{HERE}:double", {"number": k}) for k in range(3)]
+    seen: list[Record] = []
+    records = run_jobs(jobs, tmp_path / "r.jsonl", workers=2, header={"kind": "trial"}, on_record=seen.append)
+    assert [record.result["number"] for record in records] == [0, 2, 4]
+    assert len({record.result["process"] for record in records} | {os.getpid()}) == 4
+    assert {record.key for record in seen} == {"n0", "n1", "n2"}
+    assert all(record.peak_mb > 1 and record.wall_s > 0 for record in records)
+    lines = read_lines(tmp_path / "r.jsonl")
+    assert lines[0]["kind"] == "trial"
+    assert {line["key"] for line in lines[1:]} == {"n0", "n1", "n2"}
+
+
+def test_a_process_serves_as_many_jobs_as_it_may(tmp_path: Path) -> None:
+    jobs = [Job(f"n{k}", f"{HERE}:double", {"number": k}) for k in range(3)]
+    processes = [record.result["process"] for record in run_jobs(jobs, tmp_path / "r.jsonl", reuse=2)]
+    assert processes[0] == processes[1] != processes[2]
+
+
+@pytest.mark.parametrize(
+    ("name", "limits", "ending", "word"),
+    [
+        ("fail", {}, "failed", "ValueError: no luck"),
+        ("unwritable", {}, "failed", "ValueError"),
+        ("missing", {}, "failed", "AttributeError"),
+        ("die", {}, "died", "code 7: a last word"),
+        ("hang", {"time_limit_s": 1.0}, "time", "killed after 1 s"),
+        ("eat", {"memory_limit_mb": 300.0, "time_limit_s": 60.0}, "memory", "killed above 300 MB"),
+    ],
+)
+def test_every_way_to_end_is_told(tmp_path: Path, name: str, limits: dict[str, float], ending: str, word: str) -> None:
+    (record,) = run_jobs([Job("a", f"{HERE}:{name}", **limits)], tmp_path / "r.jsonl", retries=0)
+    assert record.ending == ending
+    assert word in record.error
+    assert record.result is None
+
+
+def test_a_job_whose_process_is_killed_is_tried_again(tmp_path: Path) -> None:
+    job = Job("a", f"{HERE}:die_once", {"mark": str(tmp_path / "mark")})
+    (record,) = run_jobs([job], tmp_path / "r.jsonl", retries=1)
+    assert (record.ending, record.result, record.attempts) == ("done", "alive", 2)
+
+
+def test_finished_jobs_do_not_run_again_and_half_a_line_is_cut_off(tmp_path: Path) -> None:
+    file, log = tmp_path / "r.jsonl", tmp_path / "log"
+    jobs = [Job(f"n{k}", f"{HERE}:note", {"log": str(log), "number": k}) for k in range(3)]
+    run_jobs(jobs[:2], file)
+    with file.open("a") as handle:
+        handle.write('{"key": "n2", "ending": "do')
+    assert [record.result for record in run_jobs(jobs, file)] == [0, 1, 2]
+    assert log.read_text().split() == ["0", "1", "2"]
+    assert [json.loads(line)["key"] for line in file.read_text().splitlines()] == ["n0", "n1", "n2"]
+
+
+def test_a_run_killed_in_the_middle_goes_on(tmp_path: Path) -> None:
+    """The killed run's last job may run twice; the finished ones do not."""
+    file, log = tmp_path / "r.jsonl", tmp_path / "log"
+    script = f"""
+from react_opt.jobs import Job, run_jobs
+jobs = [Job(f"n{{k}}", "job_targets:note", {{"log": {str(log)!r}, "number": k, "pause_s": 0.2}}) for k in range(30)]
+run_jobs(jobs, {str(file)!r})
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    process = subprocess.Popen([sys.executable, "-c", script], env=environment)
+    while not (file.exists() and len(file.read_bytes().splitlines()) >= 2):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    finished = [line["key"] for line in read_lines(file)]
+    jobs = [Job(f"n{k}", f"{HERE}:note", {"log": str(log), "number": k}) for k in range(6)]
+    records = run_jobs(jobs, file, workers=2)
+    assert [record.result for record in records] == list(range(6))
+    ran = log.read_text().split()
+    assert all(ran.count(key[1:]) == 1 for key in finished)
+
+
+def test_a_stop_leaves_the_running_job_for_next_time(tmp_path: Path) -> None:
+    file, log = tmp_path / "r.jsonl", tmp_path / "log"
+    jobs = [Job(f"n{k}", f"{HERE}:note", {"log": str(log), "number": k, "pause_s": 30.0 * k}) for k in range(2)]
+    stopped = run_jobs(jobs, file, should_stop=lambda: log.exists() and len(log.read_text().split()) == 2)
+    assert [record.key for record in stopped] == ["n0"]
+    assert [line["key"] for line in read_lines(file)] == ["n0"]
+
+
+def test_faults_are_named(tmp_path: Path) -> None:
+    file = tmp_path / "r.jsonl"
+    job = Job("a", f"{HERE}:double", {"number": 1})
+    with pytest.raises(UsageError, match="'a' twice"):
+        run_jobs([job, job], file)
+    with opened(file), pytest.raises(UsageError, match="another process is working on it"):
+        run_jobs([job], file)
+    file.write_text('{"key": 1}\n[]\n')
+    with pytest.raises(InputError, match="line 2: expected a JSON object"):
+        run_jobs([job], file)
+    with pytest.raises(InputError, match="cannot be written"):
+        run_jobs([job], tmp_path / "no" / "r.jsonl")
+
+
+@pytest.mark.skipif(util.find_spec("ray") is not None, reason="ray is installed")
+def test_without_ray_the_extra_is_named(tmp_path: Path) -> None:
+    with pytest.raises(MissingPartError, match=r"react_opt\[ray\]"):
+        run_jobs([Job("a", f"{HERE}:double", {"number": 1})], tmp_path / "r.jsonl", cluster="local")
+
+
+@pytest.mark.skipif(util.find_spec("ray") is None, reason="ray is not installed: the cluster backend is not tested")
+def test_jobs_run_on_a_local_ray_cluster_and_finished_ones_are_skipped(tmp_path: Path) -> None:
+    file, log = tmp_path / "r.jsonl", tmp_path / "log"
+    jobs = [Job(f"n{k}", f"{HERE}:note", {"log": str(log), "number": k}) for k in range(3)]
+    run_jobs(jobs[:1], file)
+    dying = Job("d", f"{HERE}:die")
+    records = run_jobs([*jobs, dying], file, workers=2, cluster="local", retries=0)
+    assert [record.ending for record in records] == ["done"] * 3 + ["died"]
+    assert sorted(log.read_text().split()) == ["0", "1", "2"]
