@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from react_opt.route_problem import RouteProblem
-from react_opt.solvers.routes.columns import Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.generation import Multipliers
 from react_opt.solvers.routes.memory import Memory
@@ -17,8 +16,6 @@ def certificate(
     problem: RouteProblem,
     memory: Memory,
     best: Multipliers,
-    cuts: Sequence[Rank1Cut],
-    rows: Sequence[Rank1Cut],
     joule_price: Sequence[float],
 ) -> dict[str, Any]:
     """Return the certificate of a bound.
@@ -34,20 +31,18 @@ def certificate(
     memory
         The ng-sets with which the bound was computed.
     best
-        The multipliers and the bound.
-    cuts, rows
-        The cuts and rows that the multipliers price.
+        The multipliers, what they price, and the bound.
     joule_price
         For each class a price of a joule at which the battery may be relaxed; it speeds up the recomputation and
         is of no consequence for the bound.
     """
     priced_cuts = [
         {"cells": sorted(cut.cells), "memory": sorted(cut.memory), "price": float(price)}
-        for cut, price in zip(cuts, best.duals.cut, strict=True)
+        for cut, price in zip(best.cuts, best.duals.cut, strict=True)
         if price > 0 and isinstance(cut, SubsetRow)
     ]
     priced_rows: list[dict[str, Any]] = []
-    for row, price in zip(rows, best.duals.row, strict=True):
+    for row, price in zip(best.rows, best.duals.row, strict=True):
         if price <= 0:
             continue
         if isinstance(row, StandRow):

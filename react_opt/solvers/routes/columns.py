@@ -28,12 +28,15 @@ class Column:
         Cells collected in order; a cell collected twice (non-elementary routes) stands there twice.
     path
         The whole route in the pricer's own terms.
+    instants
+        When each of ``cells`` is collected.
     """
 
     group: int
     value: float
     cells: tuple[int, ...]
     path: Any = field(compare=False, repr=False, default=None)
+    instants: tuple[int, ...] = ()
 
     @property
     def elementary(self) -> bool:
@@ -76,7 +79,7 @@ class Rank1Cut(Protocol):
 
 @dataclass(frozen=True)
 class Duals:
-    """Multipliers of the master, all but ``group`` not negative.
+    """Multipliers of the master, not negative but for ``group`` and cells that have to be collected.
 
     Parameters
     ----------

@@ -13,9 +13,7 @@ from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes.background import beside
 from react_opt.solvers.routes.budget import Budget, OnProgress, Standing, stopping
 from react_opt.solvers.routes.certificate import certificate
-from react_opt.solvers.routes.columns import Column
-from react_opt.solvers.routes.cuts import separate
-from react_opt.solvers.routes.enumeration import enumerate_routes
+from react_opt.solvers.routes.finish import Finish
 from react_opt.solvers.routes.generation import Generation
 from react_opt.solvers.routes.greedy import greedy
 from react_opt.solvers.routes.master import Master
@@ -23,15 +21,13 @@ from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pricing import RoutePricer
 from react_opt.solvers.routes.result import RoutesResult, Status, unpriced
 from react_opt.solvers.routes.routecolumn import route_column
-from react_opt.solvers.routes.rows import violated_limits
 from react_opt.solvers.routes.search import improve
-from react_opt.solvers.routes.selection import select
 from react_opt.solvers.routes.subgradient import DualAscent
+from react_opt.solvers.routes.tightening import Tightening
+from react_opt.solvers.routes.tree import Tree
 
 FIRST_MEMORY = 8
-MOST_CUTS = 64
 EASY_ROUTES = 3_000
-MOST_ROUTES = 30_000
 MANY_CELLS = 150
 PRIMAL_SHARE = 0.05
 FIRST_SEARCH_S = 0.004  # per cell
@@ -105,13 +101,11 @@ class _Proof:
         most = float(problem.reward.max(axis=1, initial=0.0).sum()) + standing.lattice.battery_j * problem.sigma
         self.master = Master(problem.n_cells, self.counts, 2.0 * most + 1.0, threads)
         self.generation = Generation(self.master, self.pricer, standing)
+        self.tightening = Tightening(self.generation, self.memory)
+        self.finish = Finish(self.generation, standing, threads, seed)
         self.notes: list[str] = []
-        self.coupled = (
-            problem.robots_per_cell is not None or problem.sensing_robots_per_step is not None or problem.forbid_swaps
-        )
         self.proof: dict[str, Any] = {}
         self._searches = 0
-        self._hopeless_gap = np.inf
 
     def run(self) -> None:
         """Go on until the plan is proven or a limit is reached."""
@@ -130,28 +124,57 @@ class _Proof:
             self._keep_certificate()
             ascent.volume()
         self._keep_certificate()
-        while not self.standing.done():
+        if self._tighten():
+            self._branch()
+        if not self.standing.done() and self.standing.budget.limit == "none":
+            self._search_on()
+
+    def _tighten(self) -> bool:
+        """Tighten the linear programme of the whole problem as long as it pays; return whether to branch then."""
+        standing, tightening = self.standing, self.tightening
+        while not standing.done():
             self._forget_columns()
             solved = self.generation.converge(at_root=True)
             self._keep_certificate()
-            if self.standing.done():
-                break
-            if not solved:
-                break
-            if self._add_limits():
+            if standing.done() or not solved:
+                return False
+            if tightening.add_limits():
                 continue
-            if self._nearly() and self._finish_by_enumeration(EASY_ROUTES):
-                break
-            if self._grow_memory():
+            if self._nearly() and self._enumerated(EASY_ROUTES):
+                return False
+            if tightening.grow_memory():
                 continue
             self._improve()
-            if self.standing.done() or self._finish_by_enumeration(EASY_ROUTES):
-                break
-            if not self._cut():
-                self._finish_by_enumeration(MOST_ROUTES)
-                break
-        if not self.standing.done() and self.standing.budget.limit == "none":
-            self._search_on()
+            if standing.done() or self._enumerated(EASY_ROUTES):
+                return False
+            if not tightening.cut():
+                return True
+        return False
+
+    def _branch(self) -> None:
+        """Search the tree."""
+        assert self.generation.best is not None
+        tree = Tree(self.generation, self.tightening, self.finish, self.standing, self.generation.best, self._between)
+        tree.run()
+        self.notes.append(f"bound from a tree of {tree.parts} parts")
+
+    def _between(self) -> None:
+        """What is done between two parts of the tree."""
+
+    def _enumerated(self, most: int) -> bool:
+        """Finish the whole problem by enumeration; return whether it was possible."""
+        best = self.generation.best
+        if best is None:
+            return False
+        bound = self.finish.bound(best, most)
+        if bound is None:
+            return False
+        self.standing.lower_bound_to(bound)
+        self.notes.append(
+            f"bound from the enumeration of {self.finish.routes} routes below the Lagrangian bound {best.bound:.9g}, "
+            "solved as a MILP"
+        )
+        return True
 
     def result(self) -> RoutesResult:
         """Return what is known."""
@@ -172,9 +195,7 @@ class _Proof:
     def _keep_certificate(self) -> None:
         best = self.generation.best
         if best is not None and (not self.proof or best.bound < self.proof["bound"]):
-            self.proof = certificate(
-                self.problem, self.memory, best, self.master.cuts, self.master.rows, self.pricer.joule_prices
-            )
+            self.proof = certificate(self.problem, self.memory, best, self.pricer.joule_prices)
 
     def _forget_columns(self) -> None:
         """Drop columns that no better plan can contain: their reduced value is below incumbent minus bound."""
@@ -184,7 +205,7 @@ class _Proof:
         reduced = dict(
             zip(
                 map(id, self.master.columns),
-                self.master.reduced_values(self.generation.extended(best.duals)),
+                self.master.reduced_values(self.generation.extended(best)),
                 strict=True,
             )
         )
@@ -197,31 +218,6 @@ class _Proof:
         if standing.objective is None or standing.bound is None:
             return False
         return standing.bound - standing.objective <= max(0.1 * standing.lattice.reward_unit, 1e-6 * standing.objective)
-
-    def _add_limits(self) -> bool:
-        """Add limits between robots that the linear programme breaks."""
-        point = self.generation.point
-        if point is None or not self.coupled:
-            return False
-        rows = violated_limits(self.problem, self.master.columns, point.use)
-        self.master.add_rows(rows)
-        return bool(rows)
-
-    def _grow_memory(self) -> bool:
-        """Remember cells along the cycles of routes in use; return whether anything was added."""
-        point = self.generation.point
-        if point is None:
-            return False
-        pairs: list[tuple[int, int]] = []
-        for k in np.flatnonzero(point.use > 1e-6):
-            column = self.master.columns[k]
-            if not column.elementary:
-                pairs += _cycles(column.path)
-        if not self.memory.grow(pairs):
-            return False
-        self.pricer.remember()
-        self.master.drop(lambda column: not column.elementary and not self.memory.allows(column.path))
-        return True
 
     def _improve(self) -> None:
         """Look for better plans: the linear programme's own, if it is whole, then a short primal search."""
@@ -237,67 +233,6 @@ class _Proof:
                 if self.standing.done():
                     return
         self._search(PRIMAL_SHARE)
-
-    def _finish_by_enumeration(self, most: int) -> bool:
-        """Enumerate all routes that a better plan can contain and choose among them; return whether it was done."""
-        standing, best = self.standing, self.generation.best
-        if best is None or self.coupled or standing.objective is None:
-            return False
-        if any(row for row in self.master.rows):
-            return False
-        gap = best.bound - standing.objective + 1e-7 * max(1.0, abs(best.bound))
-        if gap > self._hopeless_gap:
-            return False
-        self._hopeless_gap = 0.7 * gap
-        columns: list[Column] = []
-        for group in range(len(self.counts)):
-            found = enumerate_routes(
-                self.pricer,
-                group,
-                best.duals,
-                float(best.duals.group[group]) - gap,
-                self.generation.side,
-                self.master.cuts,
-                max_routes=most,
-            )
-            standing.budget.spend()
-            if found is None or len(columns) + len(found) > most:
-                return False
-            columns += found
-        chosen = select(
-            columns,
-            self.problem.n_cells,
-            self.counts,
-            gap=0.5 * (standing.slack or 0.0),
-            floor=None,
-            time_limit_s=standing.budget.left_s(),
-            node_limit=None,
-            seed=self.seed,
-            threads=self.threads,
-        )
-        standing.budget.spend()
-        if chosen.columns is not None:
-            standing.offer([column.path for column in chosen.columns])
-        if chosen.bound is None or standing.objective is None:
-            return False
-        # what was not enumerated cannot beat the incumbent that set the floor
-        standing.lower_bound_to(max(chosen.bound, standing.objective))
-        if chosen.solved:
-            self.notes.append(
-                f"bound from the enumeration of {len(columns)} routes within {gap:.6g} of the Lagrangian bound "
-                f"{best.bound:.9g}, solved as a MILP"
-            )
-        return chosen.solved
-
-    def _cut(self) -> bool:
-        """Add violated subset-row cuts; return whether there were any."""
-        point = self.generation.point
-        if point is None:
-            return False
-        cuts = separate(self.master.columns, point.use, self.problem.n_cells, self.master.cuts)
-        cuts = cuts[: MOST_CUTS - len(self.master.cuts)]
-        self.master.add_cuts(cuts)
-        return bool(cuts)
 
     def _search(self, share: float) -> None:
         """Spend a share of the time so far on the primal search (of the work so far under a work limit)."""
@@ -344,15 +279,3 @@ class _Proof:
         """Offer a plan, and its routes to the master."""
         if self.standing.offer(routes):
             self.master.add([route_column(self.problem, route) for route in routes])
-
-
-def _cycles(route: Route) -> list[tuple[int, int]]:
-    """Return the pairs (place, cell) that would have kept a route from collecting a cell twice."""
-    pairs: list[tuple[int, int]] = []
-    last: dict[int, int] = {}
-    for position in np.flatnonzero(route.sense):
-        cell = int(route.cell[position])
-        if cell in last:
-            pairs += [(int(place), cell) for place in route.cell[last[cell] : position] if place >= 0]
-        last[cell] = int(position)
-    return pairs

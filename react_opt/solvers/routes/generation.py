@@ -16,9 +16,10 @@ import numpy as np
 
 from react_opt.route_problem import FloatArray
 from react_opt.solvers.routes.budget import Standing
-from react_opt.solvers.routes.columns import Column, Duals, Priced
+from react_opt.solvers.routes.columns import Column, Duals, Priced, Rank1Cut
 from react_opt.solvers.routes.master import Master, MasterPoint
 from react_opt.solvers.routes.pricing import RoutePricer, SidePrices
+from react_opt.solvers.routes.region import Region
 from react_opt.solvers.routes.rows import side_prices
 
 SMOOTHING = 0.6
@@ -38,10 +39,14 @@ class Multipliers:
     duals
         The prices; ``duals.group`` holds the best reduced value of each class, so that the bound is
         ``sum(cell) + sum(price * rhs) + sum(n_k * group_k)``.
+    cuts, rows
+        The cuts and rows that ``duals.cut`` and ``duals.row`` price.
     """
 
     bound: float
     duals: Duals
+    cuts: tuple[Rank1Cut, ...] = ()
+    rows: tuple[Rank1Cut, ...] = ()
 
 
 class Generation:
@@ -63,19 +68,22 @@ class Generation:
         self.side = SidePrices()
         self._exact_s = self._beam_s = 0.0
 
-    def converge(self, *, at_root: bool, enough: float | None = None) -> bool:
+    def look_at(self, region: Region) -> None:
+        """Look at the plans of a region from now on."""
+        self.master.restrict(region)
+        self.side = SidePrices(region=region)
+
+    def converge(self, *, at_root: bool) -> bool:
         """Generate columns until the linear programme is solved; return whether it is.
 
-        Stops early (returning False) at a limit, or when the bound proves the incumbent or drops to ``enough``.
+        Stops early (returning False) at a limit, or when the bound proves the incumbent.
 
         Parameters
         ----------
         at_root
             Whether a bound found here holds for the whole problem.
-        enough
-            Bound that suffices.
         """
-        centre = None if self.best is None else self.extended(self.best.duals)
+        centre = None if self.best is None else self.extended(self.best)
         self.best = None
         smoothing = SMOOTHING
         while not self.standing.budget.over():
@@ -89,19 +97,20 @@ class Generation:
             if priced.best is not None:
                 bound = self.bound(duals, priced.best)
                 if self.best is None or bound < self.best.bound:
-                    self.best = Multipliers(bound, replace(duals, group=priced.best))
+                    self.best = Multipliers(
+                        bound, replace(duals, group=priced.best), tuple(self.master.cuts), tuple(self.master.rows)
+                    )
                     centre = duals
                 if at_root:
                     self.standing.lower_bound_to(bound)
-                if self._settled(self.best.bound, enough):
+                if self.standing.proven(self.standing.lattice.round_down(self.best.bound)):
                     return False
             elif centre is None:
                 centre = duals
             gap = np.inf if self.best is None else self.best.bound - point.value
-            added = self.master.add(columns)
             if gap <= 1e-8 * max(1.0, abs(point.value)):
                 return True
-            if added == 0:
+            if self.master.add(columns) == 0:
                 if smoothing == 0.0 and priced.best is not None:
                     return True
                 smoothing = 0.0
@@ -124,21 +133,21 @@ class Generation:
         total += sum(price * row.rhs for price, row in zip(duals.row, self.master.rows, strict=True))
         return float(total)
 
-    def extended(self, duals: Duals) -> Duals:
-        """Return multipliers with zeros for cuts and rows that came later.
+    def extended(self, known: Multipliers) -> Duals:
+        """Return multipliers for the region, cuts and rows that are there now; zero where they are new.
 
         Parameters
         ----------
-        duals
+        known
             Multipliers of an earlier master.
         """
-        cut, row = np.zeros(len(self.master.cuts)), np.zeros(len(self.master.rows))
-        cut[: len(duals.cut)], row[: len(duals.row)] = duals.cut, duals.row
-        return replace(duals, cut=cut, row=row)
-
-    def _settled(self, bound: float, enough: float | None) -> bool:
-        bound = self.standing.lattice.round_down(bound)
-        return self.standing.proven(bound) or (enough is not None and bound <= enough)
+        price = dict(zip(known.cuts, known.duals.cut.tolist(), strict=True))
+        price |= dict(zip(known.rows, known.duals.row.tolist(), strict=True))
+        cut = np.array([price.get(one, 0.0) for one in self.master.cuts])
+        row = np.array([price.get(one, 0.0) for one in self.master.rows])
+        cell, region = known.duals.cell, self.master.region
+        must = np.zeros(len(cell), np.bool_) if region is None else region.must
+        return replace(known.duals, cell=np.where(must, cell, np.maximum(cell, 0.0)), cut=cut, row=row)
 
     def _price(self, duals: Duals) -> tuple[list[Column], Priced]:
         """Return columns from a beam and its complements, and the exact pricing that bounds them."""

@@ -6,7 +6,8 @@
          cuts and side rows  <= rhs                               (prices >= 0)
          x >= 0
 
-with a_ir how often column r collects cell i.
+with a_ir how often column r collects cell i. In a region of branching the row of a cell that has to be collected
+is an equation, and columns that leave the region's windows are held at 0.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 
 from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut, counted
+from react_opt.solvers.routes.region import Region
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class MasterPoint:
     duals
         Multipliers, clipped to their sign.
     lacking
-        How much of the robots could not be given a column (0 unless the columns are infeasible together).
+        How much of the robots and of the cells to collect could not be given a column.
     """
 
     value: float
@@ -53,7 +55,8 @@ class Master:
     counts
         Number of robots of each group.
     penalty
-        What leaving a robot without a column costs; larger than any plan's value.
+        What leaving a robot without a column, or a cell uncollected that has to be collected, costs; larger than any
+        plan's value.
     threads
         Threads for HiGHS.
     """
@@ -69,10 +72,12 @@ class Master:
         self._side_rows: list[int] = []
         self._penalty = penalty
         self._threads = threads
+        self._extra = len(self.counts) + n_cells  # artificial columns
+        self.region: Region | None = None
         self._start()
 
     def _start(self) -> None:
-        """Make an empty model with cell and group rows and one artificial column per group."""
+        """Make an empty model with cell and group rows and one artificial column for each."""
         self._lp = highspy.Highs()
         self._lp.setOptionValue("output_flag", False)
         self._lp.setOptionValue("threads", self._threads)
@@ -85,16 +90,16 @@ class Master:
         lower = np.concatenate((np.full(self.n_cells, -inf), np.array(self.counts, dtype=np.float64)))
         starts = np.zeros(len(upper), dtype=np.int32)
         self._lp.addRows(len(upper), lower, upper, 0, starts, none_int, none)
-        groups = len(self.counts)
+        extra = self._extra
         self._lp.addCols(
-            groups,
-            np.full(groups, self._penalty),
-            np.zeros(groups),
-            np.full(groups, inf),
-            groups,
-            np.arange(groups, dtype=np.int32),
-            np.arange(self.n_cells, self.n_cells + groups, dtype=np.int32),
-            np.ones(groups),
+            extra,
+            np.full(extra, self._penalty),
+            np.zeros(extra),
+            np.concatenate((np.zeros(self.n_cells), np.full(extra - self.n_cells, inf))),
+            extra,
+            np.arange(extra, dtype=np.int32),
+            np.arange(extra, dtype=np.int32),
+            np.ones(extra),
         )
 
     def add(self, columns: Iterable[Column]) -> int:
@@ -115,7 +120,7 @@ class Master:
             len(fresh),
             -np.array([column.value for column in fresh]),
             np.zeros(len(fresh)),
-            np.full(len(fresh), highspy.kHighsInf),
+            self._most(fresh),
             len(indices),
             np.array(starts, dtype=np.int32),
             indices,
@@ -142,11 +147,46 @@ class Master:
         gone = [k for k, column in enumerate(self.columns) if unwanted(column)]
         if not gone:
             return
-        index = np.array(gone, dtype=np.int32) + len(self.counts)
+        index = np.array(gone, dtype=np.int32) + self._extra
         self._lp.deleteCols(len(index), index)
         for k in reversed(gone):
             self._known.discard(_key(self.columns[k]))
             del self.columns[k]
+
+    def restrict(self, region: Region) -> None:
+        """Look at the plans of a region from now on.
+
+        Parameters
+        ----------
+        region
+            The region.
+        """
+        self.region = region
+        n, inf = self.n_cells, highspy.kHighsInf
+        index = np.concatenate((np.arange(n), np.arange(len(self.columns)) + self._extra)).astype(np.int32)
+        upper = np.concatenate((np.where(region.must, inf, 0.0), self._most(self.columns)))
+        self._lp.changeColsBounds(len(index), index, np.zeros(len(index)), upper)
+        for cell in range(n):
+            self._lp.changeRowBounds(cell, 1.0 if region.must[cell] else -inf, 1.0)
+
+    def _most(self, columns: Sequence[Column]) -> FloatArray:
+        """Return how much of each column may be used."""
+        region = self.region
+        if region is None:
+            return np.full(len(columns), highspy.kHighsInf)
+        return np.where(region.allowed(columns), highspy.kHighsInf, 0.0)
+
+    def drop_cuts(self, unwanted: Callable[[Rank1Cut], bool]) -> None:
+        """Remove all cuts that a test picks out."""
+        gone = [k for k, cut in enumerate(self.cuts) if unwanted(cut)]
+        if not gone:
+            return
+        rows = np.array(sorted(self._cut_rows[k] for k in gone), dtype=np.int32)
+        self._lp.deleteRows(len(rows), rows)
+        for k in reversed(gone):
+            del self.cuts[k], self._cut_rows[k]
+        self._cut_rows = [row - int(np.searchsorted(rows, row)) for row in self._cut_rows]
+        self._side_rows = [row - int(np.searchsorted(rows, row)) for row in self._side_rows]
 
     def add_cuts(self, cuts: Sequence[Rank1Cut]) -> None:
         """Add cuts (priced through ``Duals.cut``)."""
@@ -161,8 +201,7 @@ class Master:
             self.rows.append(row)
 
     def _add_row(self, row: Rank1Cut) -> int:
-        groups = len(self.counts)
-        pairs = [(k + groups, row.coefficient(column)) for k, column in enumerate(self.columns)]
+        pairs = [(k + self._extra, row.coefficient(column)) for k, column in enumerate(self.columns)]
         pairs = [(k, coefficient) for k, coefficient in pairs if coefficient]
         index = np.array([k for k, _ in pairs], dtype=np.int32)
         values = np.array([coefficient for _, coefficient in pairs])
@@ -189,14 +228,15 @@ class Master:
         price = -np.array(solution.row_dual)
         use = np.array(solution.col_value)
         groups, n = len(self.counts), self.n_cells
+        cell = np.maximum(price[:n], 0.0)
         duals = Duals(
-            np.maximum(price[:n], 0.0),
+            cell if self.region is None else np.where(self.region.must, price[:n], cell),
             price[n : n + groups],
             np.maximum(price[self._cut_rows], 0.0) if self._cut_rows else np.zeros(0),
             np.maximum(price[self._side_rows], 0.0) if self._side_rows else np.zeros(0),
         )
         value = -float(self._lp.getInfo().objective_function_value)
-        return MasterPoint(value, use[groups:], duals, float(use[:groups].sum()))
+        return MasterPoint(value, use[self._extra :], duals, float(use[: self._extra].sum()))
 
     def reduced_values(self, duals: Duals) -> FloatArray:
         """Return value minus prices of every column held."""

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.errors import UsageError
-from react_opt.route_problem import FloatArray, IntArray, Route, RouteProblem
+from react_opt.route_problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.columns import Column, Duals, Priced, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.labels import flat_values, grow_labels, trace
 from react_opt.solvers.routes.labelstore import NEVER, Fuel, Graph, Labels, Prices
 from react_opt.solvers.routes.memory import Memory
+from react_opt.solvers.routes.region import Region
 from react_opt.solvers.routes.routecolumn import route_column
 
 MAX_LABELS = 20_000_000
@@ -24,7 +25,7 @@ BACKWARD_LABELS = 100_000
 
 @dataclass(frozen=True)
 class SidePrices:
-    """Prices of standing in a cell at an instant and of sensing at an instant, and what branching forbids.
+    """Prices of standing in a cell at an instant and of sensing at an instant, and the region that branching looks at.
 
     Parameters
     ----------
@@ -32,14 +33,13 @@ class SidePrices:
         ``(T + 1, n)`` price of standing, infinite where it is forbidden; None if there is none.
     sense
         ``(T + 1,)`` price of sensing; None if there is none.
-    first, last
-        ``(n,)`` instants between which each cell may be collected.
+    region
+        When each class may collect each cell; None if always.
     """
 
     stand: FloatArray | None = None
     sense: FloatArray | None = None
-    first: IntArray | None = None
-    last: IntArray | None = None
+    region: Region | None = None
 
 
 NO_SIDE_PRICES = SidePrices()
@@ -132,9 +132,10 @@ class RoutePricer:
         gain = problem.reward.T - (problem.sigma * data.sense_j + duals.cell)[None, :]
         if side.sense is not None:
             gain = gain - side.sense[:, None]
-        instant = np.arange(problem.horizon + 1)[:, None]
-        if side.first is not None and side.last is not None:
-            gain = np.where((instant < side.first) | (instant > side.last), NEVER, gain)
+        if side.region is not None:
+            first, last = side.region.first[group], side.region.last[group]
+            instant = np.arange(problem.horizon + 1)[:, None]
+            gain = np.where((instant < first) | (instant > last), NEVER, gain)
         gain[: max(1, data.start_step)] = NEVER
         gain[problem.sigma * data.sense_j >= problem.reward.T] = NEVER
         stand = self._no_stand if side.stand is None else side.stand
@@ -163,7 +164,7 @@ class RoutePricer:
         duals
             Multipliers of the master.
         side
-            Prices of coupling limits and what branching forbids.
+            Prices of coupling limits, and the region that branching looks at.
         cuts
             The cuts that ``duals.cut`` prices.
         width

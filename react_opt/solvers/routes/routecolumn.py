@@ -25,8 +25,9 @@ def route_column(problem: RouteProblem, route: Route) -> Column:
     return Column(
         route.robot_class,
         coverage + problem.sigma * end_battery(problem, route),
-        tuple(int(c) for c in sensed),
+        tuple(sensed.tolist()),
         route,
+        tuple(instants[route.sense].tolist()),
     )
 
 
