@@ -143,16 +143,24 @@ def lay_grid(space: FreeSpace, region: int, cell_m: float) -> AreaGrid:
     for axis, zero in ((0, origin[0]), (1, origin[1])):
         taken = np.flatnonzero(reachable.any(axis=axis))
         low, high = max(0.0, taken[0] - reach), min(reachable.shape[1 - axis], taken[-1] + 1 + reach)
-        slack = 1e-6 * side
-        count = max(1, ceil((high - low - slack) / side))
-        start = zero + floor((low - zero + slack) / side) * side
-        if start + count * side < high - slack:
-            start = (low + high - count * side) / 2
-        lines = (start + np.arange(min(count, MAX_AREAS) + 1) * side) / space.refine
+        lines = grid_lines(float(low), float(high), float(zero), side) / space.refine
         edges.append(np.rint(lines).astype(np.int64) * space.refine)
     if (len(edges[0]) - 1) * (len(edges[1]) - 1) > MAX_AREAS:
         raise UsageError(f"cells of {cell_m:g} m make more than {MAX_AREAS} of them on this map")
     return AreaGrid(space, reachable, edges[0], edges[1])
+
+
+def grid_lines(low: float, high: float, zero: float, side: float) -> FloatArray:
+    """Return the fewest lines a ``side`` apart that enclose ``[low, high]``.
+
+    Multiples of the side from ``zero`` where they do with so few, else centred.
+    """
+    slack = 1e-6 * side
+    count = max(1, ceil((high - low - slack) / side))
+    start = zero + floor((low - zero + slack) / side) * side
+    if start + count * side < high - slack:
+        start = (low + high - count * side) / 2
+    return np.asarray(start + np.arange(min(count, MAX_AREAS) + 1) * side, dtype=np.float64)
 
 
 def cut(space: FreeSpace, window: Window) -> FreeSpace:

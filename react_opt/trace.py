@@ -107,8 +107,8 @@ class PixelMap(Part):
     ----------
     rows, cols
         Shape; row 0 has the smallest y.
-    resolution_m, origin_x_m, origin_y_m
-        Side of a pixel and the outer corner of pixel (0, 0), m.
+    resolution_m, origin_x_m, origin_y_m, origin_yaw_rad
+        Side of a pixel, m, and the pose of the outer corner of pixel (0, 0), m and rad.
     unit_s
         For times: one unit in s.
     data
@@ -120,6 +120,7 @@ class PixelMap(Part):
     resolution_m: Number
     origin_x_m: Number
     origin_y_m: Number
+    origin_yaw_rad: Number = 0.0
     unit_s: Number = 1.0
     data: Name
 
@@ -133,6 +134,34 @@ def pixel_data(numbers: NDArray[np.uint16] | NDArray[np.uint8]) -> str:
     """Return numbers per pixel as :class:`PixelMap` holds them."""
     little = numbers.astype("<u2") if numbers.dtype == np.uint16 else numbers
     return base64.b64encode(zlib.compress(np.ascontiguousarray(little).tobytes(), 9)).decode("ascii")
+
+
+class Track(Part):
+    """Where a robot was at every instant at which it may scan, compressed: what a replay needs to scan again.
+
+    Parameters
+    ----------
+    robot
+        Its id.
+    unit_s
+        Time from one instant to the next, s; the first is 0.
+    data
+        Rows of four little-endian float64: pose on the grid (m along the map's columns and rows from its corner,
+        rad from the columns' direction), and 1 where it scanned, else 0; zlib, base64.
+    """
+
+    robot: Name
+    unit_s: Number
+    data: Name
+
+    def array(self) -> NDArray[np.float64]:
+        """Return the ``(n, 4)`` rows."""
+        return np.frombuffer(zlib.decompress(base64.b64decode(self.data)), dtype="<f8").reshape(-1, 4)
+
+
+def track_data(rows: NDArray[np.float64]) -> str:
+    """Return ``(n, 4)`` rows as :class:`Track` holds them."""
+    return base64.b64encode(zlib.compress(np.ascontiguousarray(rows, dtype="<f8").tobytes(), 6)).decode("ascii")
 
 
 class Trace(Part):
@@ -152,6 +181,8 @@ class Trace(Part):
         Per pixel when it became known, in units of ``unit_s``; :data:`NEVER` where it did not.
     truth
         Per pixel 0 free, 1 occupied, 2 unknown in the map file, plus 4 where it counts as coverable.
+    tracks
+        The robots' poses at the instants of scans.
     events
         In order of time.
     wall_s
@@ -168,6 +199,7 @@ class Trace(Part):
     frames: tuple[TraceFrame, ...]
     known: PixelMap
     truth: PixelMap
+    tracks: tuple[Track, ...] = ()
     events: tuple[TraceEvent, ...]
     wall_s: dict[str, Number] = {}
     decisions_wall_s: tuple[Number, ...] = ()

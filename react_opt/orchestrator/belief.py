@@ -109,9 +109,15 @@ class LocalTarget:
 class Belief(Protocol):
     """The view a strategy gets. Numbers are as of the last map that arrived, at ``t_s``."""
 
-    t_s: float
-    version: int
-    """Grows with every change of the map."""
+    @property
+    def t_s(self) -> float:
+        """Simulated (or real) time of the belief, s."""
+        ...
+
+    @property
+    def version(self) -> int:
+        """Grows with every change of the map."""
+        ...
 
     @property
     def map(self) -> OccupancyMap:

@@ -1,0 +1,275 @@
+"""The belief of a fleet, built from what its robots report: the implementation of the view that strategies get.
+
+Feed it with :meth:`FleetBelief.merge` (pixels), :meth:`FleetBelief.merge_scan` (a laser scan) or
+:meth:`FleetBelief.merge_map` (a robot's whole map), and :meth:`FleetBelief.report` (a robot's state). Everything
+else is worked out from that when it is asked for, and only where the map has changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil, floor
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from react_opt.energy import RobotProfile
+from react_opt.geometry.occupancy import FREE, OCCUPIED, OccupancyMap
+from react_opt.geometry.raycast import ray_table, rays_px, unknown_ahead_px
+from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget, RobotView
+from react_opt.orchestrator.belief_areas import Areas
+from react_opt.orchestrator.belief_map import BeliefMap
+from react_opt.orchestrator.belief_paths import Field, nearest_block, search, slowness, way_to
+from react_opt.orchestrator.belief_regions import flood
+
+SNAP_M = 0.5
+"""A point is driven to, or left from, at the nearest place within this where the robot can stand."""
+
+_LOOK_RAYS = 360
+
+
+class FleetBelief:
+    """What a fleet believes (an implementation of :class:`react_opt.orchestrator.belief.Belief`).
+
+    Parameters
+    ----------
+    frame
+        Fixes pixels: origin and resolution of the maps that robots send; its cells do not count.
+    extent_m
+        What is known of the building's size: ``(x0, y0, x1, y1)``, two opposite corners, m.
+    cell_m
+        Side of an area, m. Areas start at the first corner.
+    profiles
+        The kinds of robots there are.
+    range_m
+        LiDAR range that local targets are judged by, m.
+    prior
+        A sketch of the building, which may be wrong.
+    """
+
+    def __init__(
+        self,
+        frame: OccupancyMap,
+        extent_m: tuple[float, float, float, float],
+        cell_m: float,
+        profiles: Sequence[RobotProfile],
+        *,
+        range_m: float = 8.0,
+        prior: OccupancyMap | None = None,
+    ) -> None:
+        self._profiles = sorted(dict.fromkeys(profiles), key=lambda profile: profile.radius_m)
+        radii = tuple(sorted({profile.radius_m for profile in self._profiles}))
+        self._layer = {profile: radii.index(profile.radius_m) for profile in self._profiles}
+        cap = max([0.5, *(max(p.full_speed_clearance_m, p.radius_m) for p in self._profiles)])
+        corners = frame.world_to_pixel(np.array(extent_m, dtype=np.float64).reshape(2, 2))
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        room = ceil(1.0 / frame.resolution_m)
+        window = (floor(low[1]) - room, ceil(high[1]) + room, floor(low[0]) - room, ceil(high[0]) + room)
+        self._map = BeliefMap(frame, window, radii, cap, prior)
+        self._areas = Areas(self._map, low, high, cell_m, range_m)
+        self._robots: dict[str, RobotView] = {}
+        self._reported = 0
+        self._fresh = (-1, -1)
+        self._slow: dict[tuple[int, bool], np.ndarray] = {}
+        self._fields: dict[tuple[int, bool, int], Field] = {}
+        self._marks = np.zeros((1, 1), dtype=np.int32)
+        self._mark = 0
+        self.t_s = 0.0
+
+    # --- what comes in ---
+
+    def merge(self, t_s: float, rows: ArrayLike, cols: ArrayLike, values: ArrayLike) -> int:
+        """Merge pixels observed by a robot (row and column in the frame; 0 free, 1 occupied); the later one wins.
+
+        Returns how many pixels changed.
+        """
+        self.t_s = max(self.t_s, t_s)
+        return self._map.merge(rows, cols, values)
+
+    def merge_scan(
+        self, t_s: float, x_m: float, y_m: float, angles_rad: ArrayLike, ranges_m: ArrayLike, range_max_m: float
+    ) -> int:
+        """Merge a laser scan taken at a place: free along each ray, occupied at its end.
+
+        Parameters
+        ----------
+        t_s
+            When, s.
+        x_m, y_m
+            Where, m.
+        angles_rad, ranges_m
+            Directions in the world, rad, and what was measured, m. Rays that measured ``range_max_m`` or more, or
+            nothing (infinite), hit nothing; NaN and negative ones are left out.
+        range_max_m
+            The sensor's range, m.
+        """
+        angles = np.asarray(angles_rad, dtype=np.float64) - self._map.frame.origin_yaw_rad
+        ranges = np.asarray(ranges_m, dtype=np.float64)
+        good = ranges >= 0
+        x, y = self._map.frame.world_to_pixel((x_m, y_m))
+        unit = self._map.frame.resolution_m
+        pixels, hits = rays_px(x, y, angles[good], ranges[good] / unit, range_max_m / unit)
+        values = np.where(hits, OCCUPIED, FREE).astype(np.uint8)
+        return self.merge(t_s, pixels[:, 0], pixels[:, 1], values)
+
+    def merge_map(self, t_s: float, other: OccupancyMap) -> int:
+        """Merge all that a robot's own map knows; its resolution is the frame's."""
+        rows, cols = np.nonzero(other.cells <= OCCUPIED)
+        centres = other.pixel_to_world(np.stack((cols, rows), axis=1) + 0.5)
+        pixels = np.floor(self._map.frame.world_to_pixel(centres)).astype(np.int64)
+        return self.merge(t_s, pixels[:, 1], pixels[:, 0], other.cells[rows, cols])
+
+    def report(self, robot: RobotView) -> None:
+        """Take note of a robot's state; the first report of a robot makes it known."""
+        self._robots[robot.id] = robot
+        self._reported += 1
+        self.t_s = max(self.t_s, robot.heard_s)
+
+    # --- what strategies see ---
+
+    @property
+    def version(self) -> int:
+        """Grows with every change of the map."""
+        return self._map.version
+
+    @property
+    def map(self) -> OccupancyMap:
+        """The merged map as observed."""
+        return self._map.merged()
+
+    @property
+    def robots(self) -> tuple[RobotView, ...]:
+        """All robots, in the order of their first reports."""
+        return tuple(self._robots.values())
+
+    @property
+    def areas(self) -> tuple[AreaView, ...]:
+        """All areas, in the order they became known."""
+        self._refresh()
+        return self._areas.views()
+
+    @property
+    def targets(self) -> tuple[LocalTarget, ...]:
+        """The local targets, in the order they appeared."""
+        self._refresh()
+        return self._areas.targets()
+
+    def area_of(self, point_m: tuple[float, float]) -> str | None:
+        """Return the id of the area that a point lies in, None for none."""
+        return self._areas.area_of(point_m)
+
+    def explored_share(self, area: str) -> float:
+        """Return c[a,b] of an area by its id, as when it was last asked for."""
+        return self._areas.share(area)
+
+    def is_area(self, name: str) -> bool:
+        """Tell whether a name is an area's id."""
+        return self._areas.is_area(name)
+
+    def costs(
+        self, robot: RobotView, points_m: ArrayLike, *, optimistic: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return time (s) and energy (J, without sensing) for a robot to drive to ``(n, 2)`` points, NaN: no way."""
+        field = self._field(robot.profile, self._start(robot.profile, (robot.x_m, robot.y_m), optimistic), optimistic)
+        return self._read(robot.profile, field, points_m, optimistic)
+
+    def path(
+        self, robot: RobotView, goal_m: tuple[float, float], *, optimistic: bool = False
+    ) -> tuple[tuple[float, float], ...]:
+        """Return way points to the goal, the robot's place first; empty where there is no way."""
+        slow = self._slowness(robot.profile, optimistic)
+        (goal,) = self._blocks(slow, [goal_m])
+        if goal < 0:
+            return ()
+        field = self._field(robot.profile, self._start(robot.profile, (robot.x_m, robot.y_m), optimistic), optimistic)
+        way = way_to(slow, field[2], field[0], int(goal), self._side_m)
+        if way.size == 0:
+            return ()
+        points = [(float(x), float(y)) for x, y in self._map.centres_m(way)]
+        return ((robot.x_m, robot.y_m), *points[(1 if len(points) > 1 else 0) :])
+
+    def table(self, profile: RobotProfile, points_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return time (s) and energy (J) between ``(n, 2)`` points over known-free space as ``(n, n)``, NaN: no way."""
+        points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
+        times, energies = np.full((2, len(points), len(points)), np.nan)
+        starts = self._blocks(self._slowness(profile, False), points)
+        for n, start in enumerate(starts):
+            if start >= 0:
+                field = self._field(profile, int(start), False)
+                times[n], energies[n] = self._read(profile, field, points, False)
+        return times, energies
+
+    def would_see(self, point_m: tuple[float, float], range_m: float) -> int:
+        """Return how many unknown pixels a scan from a point would reveal if unknown space were free."""
+        cells = self._map.cells
+        if self._marks.shape != cells.shape:
+            self._marks, self._mark = np.zeros(cells.shape, dtype=np.int32), 0
+        self._mark += 1
+        x, y = self._map.to_canvas(point_m)
+        reach = range_m / self._map.frame.resolution_m
+        table = ray_table(_LOOK_RAYS)
+        return int(unknown_ahead_px(cells, x, y, 1.0, 0.0, table, reach, self._marks, self._mark, cells.size))
+
+    # --- how it is worked out ---
+
+    @property
+    def _side_m(self) -> float:
+        return self._map.k * self._map.frame.resolution_m
+
+    def _refresh(self) -> None:
+        """Bring regions and areas up to date with the map and the robots' places."""
+        if self._fresh == (self._map.version, self._reported):
+            return
+        self._fresh = (self._map.version, self._reported)
+        alive = [robot for robot in self._robots.values() if robot.state != "dead"]
+        reached = [flood(self._map.passable(0, unknown), self._starts(alive, unknown)) for unknown in (False, True)]
+        self._areas.refresh(reached[0], reached[1])
+
+    def _starts(self, robots: Sequence[RobotView], optimistic: bool) -> np.ndarray:
+        starts = [self._start(robot.profile, (robot.x_m, robot.y_m), optimistic) for robot in robots]
+        return np.array(starts, dtype=np.int64)
+
+    def _start(self, profile: RobotProfile, point_m: tuple[float, float], optimistic: bool) -> int:
+        """Return the block that a robot drives from: the nearest where it may stand, else its own."""
+        (block,) = self._blocks(self._slowness(profile, optimistic), [point_m])
+        if block >= 0:
+            return int(block)
+        rows, cols = self._map.clear.shape
+        x, y = self._map.to_canvas(point_m) / self._map.k
+        return min(max(int(y), 0), rows - 1) * cols + min(max(int(x), 0), cols - 1)
+
+    def _blocks(self, slow: np.ndarray, points_m: ArrayLike) -> np.ndarray:
+        pixels = self._map.to_canvas(np.asarray(points_m, dtype=np.float64).reshape(-1, 2)) / self._map.k
+        reach = SNAP_M / self._side_m
+        return np.array([nearest_block(slow, x, y, reach) for x, y in pixels], dtype=np.int64)
+
+    def _slowness(self, profile: RobotProfile, optimistic: bool) -> np.ndarray:
+        self._forget()
+        key = (self._profiles.index(profile), optimistic)
+        if key not in self._slow:
+            passable = self._map.passable(self._layer[profile], optimistic)
+            self._slow[key] = slowness(self._map.clear, passable, profile, self._map.frame.resolution_m)
+        return self._slow[key]
+
+    def _field(self, profile: RobotProfile, start: int, optimistic: bool) -> Field:
+        slow = self._slowness(profile, optimistic)
+        key = (self._profiles.index(profile), optimistic, start)
+        if key not in self._fields:
+            every = np.empty(0, dtype=np.int64)
+            self._fields[key] = search(slow, start, self._side_m, profile.speed_max_m_s, every)
+        return self._fields[key]
+
+    def _forget(self) -> None:
+        if getattr(self, "_planned", -1) != self._map.version:
+            self._planned = self._map.version
+            self._slow.clear()
+            self._fields.clear()
+
+    def _read(
+        self, profile: RobotProfile, field: Field, points_m: ArrayLike, optimistic: bool
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return times and energies of a field at points."""
+        blocks = self._blocks(self._slowness(profile, optimistic), points_m)
+        times, lengths = field[0][blocks], field[1][blocks]
+        times = np.where((blocks >= 0) & np.isfinite(times), times, np.nan)
+        return times, profile.drive_energy_j(np.where(np.isnan(times), np.nan, lengths), times)

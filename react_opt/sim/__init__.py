@@ -1,0 +1,1 @@
+"""The simulated building and its robots: a mission driven by a strategy that sees its belief alone."""

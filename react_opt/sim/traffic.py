@@ -1,0 +1,78 @@
+"""How robots move among walls and each other."""
+
+from __future__ import annotations
+
+from math import cos, hypot, sin
+
+import numpy as np
+
+from react_opt.energy import speed_at
+from react_opt.geometry.inflation import clearance_px
+from react_opt.kernels import kernel
+from react_opt.sim.robot import SimRobot
+from react_opt.sim.world import World, footprint_free
+
+
+class Traffic:
+    """Moves robots tick by tick: none enters a wall or another robot.
+
+    Parameters
+    ----------
+    world
+        The truth.
+    robots
+        All of them, in the mission's order.
+    blocking
+        Whether robots block each other; else they pass through each other.
+    """
+
+    def __init__(self, world: World, robots: list[SimRobot], blocking: bool) -> None:
+        self._world = world
+        self._robots = robots
+        self._blocking = blocking
+        self._unit = world.map.resolution_m
+
+    def move(self, dt: float) -> None:
+        """Move every robot by one tick."""
+        for robot in self._robots:
+            if robot.alive:
+                self._step(robot, dt)
+
+    def _step(self, robot: SimRobot, dt: float) -> None:
+        profile = robot.profile
+        clear_m = _clearance(self._world.space.clearance_m, robot.u_m / self._unit, robot.v_m / self._unit)
+        cap = robot.speed_factor * speed_at(
+            clear_m, profile.radius_m, profile.full_speed_clearance_m, profile.speed_min_m_s, profile.speed_max_m_s
+        )
+        before = robot.heading_rad
+        speed, turning, heading, length = robot.plan_motion(dt, cap)
+        u, v = robot.u_m + length * cos(heading), robot.v_m + length * sin(heading)
+        if length > 0 and self._free(robot, u, v, heading):
+            robot.u_m, robot.v_m, robot.heading_rad = u, v, heading
+            robot.speed_m_s, robot.turning_rad_s = speed, turning
+            return
+        robot.speed_m_s = 0.0 if length > 0 else speed
+        if turning != 0 and self._free(robot, robot.u_m, robot.v_m, heading):
+            robot.heading_rad, robot.turning_rad_s = heading, turning
+        else:
+            robot.heading_rad, robot.turning_rad_s = before, 0.0
+
+    def _free(self, robot: SimRobot, u: float, v: float, heading: float) -> bool:
+        half_l, half_w = robot.profile.length_m / 2 / self._unit, robot.profile.width_m / 2 / self._unit
+        x, y = u / self._unit, v / self._unit
+        if not footprint_free(self._world.blocked, x, y, cos(heading), sin(heading), half_l, half_w):
+            return False
+        return not self._blocking or not any(
+            self._too_near(robot, other, u, v) for other in self._robots if other is not robot
+        )
+
+    @staticmethod
+    def _too_near(robot: SimRobot, other: SimRobot, u: float, v: float) -> bool:
+        least = robot.profile.radius_m + other.profile.radius_m
+        gap = hypot(u - other.u_m, v - other.v_m)
+        return gap < least and gap < hypot(robot.u_m - other.u_m, robot.v_m - other.v_m)
+
+
+@kernel
+def _clearance(clearance_m: np.ndarray, x: float, y: float) -> float:
+    return clearance_px(clearance_m, x, y)

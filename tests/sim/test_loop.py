@@ -1,0 +1,57 @@
+"""A mission as a whole: it gets somewhere, and the same mission gives the same trace."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from react_opt.instance import Noise
+from react_opt.sim.loop import Simulation
+from react_opt.trace import NEVER, Trace
+from tests.sim.missions import TWO_ROOMS, mission
+
+
+def told(trace: Trace) -> dict[str, Any]:
+    """Return all of a trace but what the machine's speed decides."""
+    return trace.model_dump(mode="json", exclude={"wall_s", "decisions_wall_s"})
+
+
+NOISY = Noise(speed=0.05, waiting_s=0.3, power=0.02)
+
+
+def test_two_robots_see_two_rooms() -> None:
+    trace = Simulation(mission([(1.5, 1.5), (1.5, 4.0)]), TWO_ROOMS).run()
+    assert trace.frames[-1].coverage > 0.97
+    assert trace.status == "finished"
+
+
+def test_the_same_seed_gives_the_same_trace_and_another_seed_another() -> None:
+    runs = [
+        Simulation(mission([(1.5, 1.5), (1.5, 4.0)], noise=NOISY, seed=seed), TWO_ROOMS).run() for seed in (3, 3, 4)
+    ]
+    assert told(runs[0]) == told(runs[1])
+    assert told(runs[0])["frames"] != told(runs[2])["frames"]
+
+
+def test_batteries_never_rise_and_seen_pixels_are_never_unseen() -> None:
+    trace = Simulation(mission([(1.5, 1.5), (1.5, 4.0)], noise=NOISY), TWO_ROOMS).run()
+    for n in range(2):
+        left = [frame.robots[n].battery_j for frame in trace.frames]
+        assert all(b <= a for a, b in itertools.pairwise(left))
+    shares = [frame.coverage for frame in trace.frames]
+    assert all(b >= a for a, b in itertools.pairwise(shares))
+    known = trace.known.array("<u2")
+    assert np.count_nonzero(known != NEVER) > 0
+
+
+def test_a_robot_dies_and_the_other_goes_on() -> None:
+    trace = Simulation(
+        mission([(1.5, 1.5), (1.5, 4.0)], failures=[{"robot": "r1", "t_s": 8.0}], horizon_s=90.0), TWO_ROOMS
+    ).run()
+    dead = [(event.t_s, event.robot) for event in trace.events if event.type == "robot_dead"]
+    assert dead == [(8.0, "r1")]
+    assert trace.frames[-1].coverage > 0.97
+    places = {(frame.robots[0].x_m, frame.robots[0].y_m) for frame in trace.frames if frame.t_s >= 8}
+    assert len(places) == 1
