@@ -9,19 +9,21 @@ from collections import Counter
 from collections.abc import Iterator
 
 from react_opt.certify_base import Certificate, Violation, claim_rule, instance_rule, shown, slack
-from react_opt.instance import AssignmentInstance
+from react_opt.instance import AssignmentCost, AssignmentInstance
 from react_opt.plan import AssignmentPlan
 
 OPTIMAL_GAP = 1e-6  # relative
+Costs = dict[tuple[str, str], AssignmentCost]  # by robot and target
 
 
 def check_assignment(instance: AssignmentInstance, plan: AssignmentPlan) -> Certificate:
     """Check an assignment plan against every rule; never raises on a plan that follows the schema."""
     found = list(instance_rule(instance, plan))
+    costs = _costs(instance)
     for rule in _RULES:
-        found.extend(rule(instance, plan))
+        found.extend(rule(instance, plan, costs))
     empty = plan.claim.status in ("infeasible", "no_plan") and not (plan.assigned or plan.deferred)
-    objective = None if empty else objective_of(instance, plan)
+    objective = None if empty else _objective(instance, plan, costs)
     gap = OPTIMAL_GAP * abs(objective or 0.0)
     found.extend(claim_rule(plan.claim, objective, gap, empty))
     if plan.claim.status == "infeasible":
@@ -32,10 +34,17 @@ def check_assignment(instance: AssignmentInstance, plan: AssignmentPlan) -> Cert
 
 def objective_of(instance: AssignmentInstance, plan: AssignmentPlan) -> float:
     """Return sum of ``gain - alpha time / time_ref - beta energy / battery`` over pairs that have a cost row."""
+    return _objective(instance, plan, _costs(instance))
+
+
+def _costs(instance: AssignmentInstance) -> Costs:
+    return {(cost.robot, cost.target): cost for cost in instance.costs}
+
+
+def _objective(instance: AssignmentInstance, plan: AssignmentPlan, costs: Costs) -> float:
     weights = instance.weights
     gain = {target.id: target.gain for target in instance.targets}
     battery = {robot.id: robot.battery_j for robot in instance.robots}
-    costs = {(cost.robot, cost.target): cost for cost in instance.costs}
     total = 0.0
     for pair in plan.assigned:
         cost = costs.get((pair.robot, pair.target))
@@ -45,7 +54,7 @@ def objective_of(instance: AssignmentInstance, plan: AssignmentPlan) -> float:
     return total
 
 
-def _names(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Violation]:
+def _names(instance: AssignmentInstance, plan: AssignmentPlan, costs: Costs) -> Iterator[Violation]:
     """Robots and targets exist, and every target is assigned or deferred, once."""
     robots = {robot.id for robot in instance.robots}
     targets = {target.id for target in instance.targets}
@@ -65,15 +74,14 @@ def _names(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Viola
                 yield Violation("target", target.id, None, None, "expected in assigned or deferred")
 
 
-def _pairs(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Violation]:
+def _pairs(instance: AssignmentInstance, plan: AssignmentPlan, costs: Costs) -> Iterator[Violation]:
     """A robot takes only what it reaches, what lies in its zone, and nothing with an empty battery."""
-    reached = {(cost.robot, cost.target) for cost in instance.costs}
     robots = {robot.id: robot for robot in instance.robots}
     for pair in plan.assigned:
         robot = robots.get(pair.robot)
         if robot is None:
             continue
-        if (pair.robot, pair.target) not in reached:
+        if (pair.robot, pair.target) not in costs:
             yield Violation("reach", pair.robot, None, None, f"target {shown(pair.target)} is unreachable")
         if robot.zone is not None and pair.target not in robot.zone:
             yield Violation("zone", pair.robot, None, None, f"target {shown(pair.target)} is outside its zone")
@@ -81,7 +89,7 @@ def _pairs(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Viola
             yield Violation("energy", pair.robot, None, None, f"target {shown(pair.target)} with an empty battery")
 
 
-def _capacity(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Violation]:
+def _capacity(instance: AssignmentInstance, plan: AssignmentPlan, costs: Costs) -> Iterator[Violation]:
     """A robot takes at most ``capacity`` targets."""
     load = Counter(pair.robot for pair in plan.assigned)
     for robot in instance.robots:
@@ -90,12 +98,12 @@ def _capacity(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Vi
             yield Violation("capacity", robot.id, None, float(load[robot.id] - min(robot.capacity, 2**53)), text)
 
 
-def _energy(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Violation]:
+def _energy(instance: AssignmentInstance, plan: AssignmentPlan, costs: Costs) -> Iterator[Violation]:
     """The energies of a robot's targets add up to at most ``battery - reserve``."""
-    energy = {(cost.robot, cost.target): cost.energy_j for cost in instance.costs}
     spent: Counter[str] = Counter()
     for pair in plan.assigned:
-        spent[pair.robot] += energy.get((pair.robot, pair.target), 0.0)  # type: ignore[assignment]
+        cost = costs.get((pair.robot, pair.target))
+        spent[pair.robot] += 0.0 if cost is None else cost.energy_j  # type: ignore[assignment]
     for robot in instance.robots:
         budget, used = robot.battery_j - robot.reserve_j, float(spent[robot.id])
         if used > budget + slack(used, robot.battery_j):
@@ -103,7 +111,7 @@ def _energy(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Viol
             yield Violation("energy", robot.id, None, used - budget, text)
 
 
-def _conflicts(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Violation]:
+def _conflicts(instance: AssignmentInstance, plan: AssignmentPlan, costs: Costs) -> Iterator[Violation]:
     """Of two targets in conflict at most one is taken."""
     taken = {pair.target for pair in plan.assigned}
     for first, second in instance.conflicts:
@@ -111,7 +119,7 @@ def _conflicts(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[V
             yield Violation("conflict", first, None, None, f"taken together with {shown(second)}")
 
 
-def _reasons(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Violation]:
+def _reasons(instance: AssignmentInstance, plan: AssignmentPlan, costs: Costs) -> Iterator[Violation]:
     """A reason that bars a target is true: unreachable, zone, energy and no_gain follow from the instance."""
     weights = instance.weights
     robots = {robot.id: robot for robot in instance.robots}
@@ -120,7 +128,10 @@ def _reasons(instance: AssignmentInstance, plan: AssignmentPlan) -> Iterator[Vio
     # Per target: 0 no robot reaches it, 1 none in its zone, 2 none has the energy, 3 none gains by it,
     # 4 the best gain is zero within rounding, 5 some robot gains by it.
     near: dict[str, int] = {}
+    deferred = {row.target for row in plan.deferred}
     for cost in instance.costs:
+        if cost.target not in deferred or near.get(cost.target) == 5:
+            continue
         robot, zone = robots[cost.robot], zones[cost.robot]
         value = gain[cost.target] - weights.alpha * cost.time_s / weights.time_ref_s
         if robot.capacity == 0:

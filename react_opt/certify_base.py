@@ -92,7 +92,7 @@ def agree_value(found: float, expected: float) -> bool:
 
 def slack(*values: float) -> float:
     """Return the tolerance for numbers of this size: ``ABSOLUTE + RELATIVE * max |value|``."""
-    return ABSOLUTE + RELATIVE * max(abs(value) for value in values)
+    return ABSOLUTE + RELATIVE * max(map(abs, values))
 
 
 def shown(value: object) -> str:

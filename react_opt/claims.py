@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import platform
 
@@ -37,10 +38,15 @@ def instance_ref(instance: Document) -> InstanceRef:
 
 def versions(*packages: str) -> dict[str, str]:
     """Return the versions of react_opt, Python and some installed packages."""
-    found = {"react_opt": importlib.metadata.version("react_opt"), "python": platform.python_version()}
-    for package in packages:
-        found[package] = importlib.metadata.version(package)
-    return found
+    return {"react_opt": _version("react_opt"), "python": platform.python_version()} | {
+        package: _version(package) for package in packages
+    }
+
+
+@functools.cache
+def _version(package: str) -> str:
+    """Return a package's version, looked up once: its metadata is a mail header that takes a millisecond to parse."""
+    return importlib.metadata.version(package)
 
 
 def relaxation_bound(problem: RouteProblem) -> float:

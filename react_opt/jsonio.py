@@ -9,6 +9,7 @@ import json
 import os
 import sys
 import tempfile
+import weakref
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from react_opt.trace import Trace
 KINDS: dict[str, type[BaseModel]] = {**INSTANCE_KINDS, **PLAN_KINDS, "trace": Trace}
 STANDARD = "-"
 MAX_FILE_BYTES = 2_000_000_000
+_HASHES: dict[int, tuple[weakref.ref[Document], str]] = {}  # by identity, while the document lives
 
 
 def load(path: str | os.PathLike[str], kind: str | None = None) -> Any:
@@ -158,10 +160,17 @@ def sha256(document: Document) -> str:
     """Return the SHA-256 of a document as canonical JSON.
 
     Canonical: every default filled in, keys sorted, no white space, ASCII escapes, numbers as Python prints
-    them (fields that are real numbers always with a decimal point or an exponent).
+    them (fields that are real numbers always with a decimal point or an exponent). Documents cannot change, so
+    the hash of one that is still alive is not worked out twice.
     """
+    known = _HASHES.get(id(document))
+    if known is not None and known[0]() is document:
+        return known[1]
     text = json.dumps(canonical(document), sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    number = id(document)
+    _HASHES[number] = weakref.ref(document, lambda _: _HASHES.pop(number, None)), digest
+    return digest
 
 
 def json_schema(kind: str) -> dict[str, Any]:
