@@ -1,4 +1,4 @@
-"""The command line: ``react-opt build | solve | check | schema | solvers``."""
+"""The command line: ``react-opt build | solve | check | simulate | schema | solvers``."""
 
 from __future__ import annotations
 
@@ -233,6 +233,50 @@ def check(
     if certificate.ok:
         print(f"{plan_file}: {_verdict(plan, certificate, bound)}")
     return OK if certificate.ok else VIOLATED
+
+
+@app.command()
+def simulate(
+    mission_file: Annotated[str, typer.Argument(metavar="MISSION", help="Mission file (JSON), - for standard input.")],
+    output: Annotated[str | None, typer.Option("-o", "--output", help="Trace to write, - for standard output.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON instead of a table.")] = False,
+    strategy: Annotated[str | None, typer.Option("--strategy", help="Instead of the mission's.")] = None,
+    robots: Annotated[int | None, typer.Option("--robots", help="Only the first N robots.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Instead of the mission's.")] = None,
+    always_on: Annotated[bool, typer.Option("--always-on", help="Never switch sensors off.")] = False,
+    resume: Annotated[str | None, typer.Option("--resume", help="Go on with a trace that was stopped.")] = None,
+) -> int:
+    """Simulate a mission: robots explore a map that only the simulator knows.
+
+    Exit codes: 0 done, 2 bad input, 130 interrupted (the trace so far is written and can be resumed).
+
+    Example: react-opt simulate examples/factory/mission_3.json -o trace.json
+    """
+    from react_opt.jsonio import dumps, load, require_writable, save
+    from react_opt.report.live import mission_bar
+    from react_opt.report.missions import mission_table
+    from react_opt.sim.run import simulate as simulate_mission
+    from react_opt.sim.run import with_options
+    from react_opt.sim.summary import summarise
+
+    if mission_file == resume == "-":
+        raise UsageError("--resume: standard input is the mission already")
+    mission = with_options(
+        load(mission_file, "mission"), strategy=strategy, robots=robots, seed=seed, always_on=always_on
+    )
+    before = None if resume is None else load(resume, "trace")
+    if output is not None:
+        require_writable(output)
+    folder = Path() if mission_file == "-" else Path(mission_file).parent
+    with _named({"<data>": mission_file}), Interruption() as interruption, mission_bar(mission.horizon_s) as progress:
+        trace = simulate_mission(mission, folder, resume=before, on_progress=progress, should_stop=interruption.asked)
+    if output is not None:
+        save(trace, output)
+    if as_json and output != "-":
+        sys.stdout.write(dumps(summarise(trace)))
+    elif output is None:
+        Console().print(mission_table(summarise(trace)))
+    return INTERRUPTED if trace.status == "stopped" else OK
 
 
 @app.command()

@@ -4,6 +4,8 @@ Run ``python examples/factory/make_examples.py [FOLDER]``. Each instance is what
 
     react-opt build factory.yaml --fleet fleet_N.json --cell-m C --horizon-s 240 --step-s S -o factory_N_Cm.json
 
+The missions (``mission_N.json``) are simulated: ``react-opt simulate mission_3.json``.
+
 The fleets are 1 to 4 Clearpath Jackals that wait in the entry tunnel, the first one nearest to its mouth. What is
 known of the robot is its size, 508 mm x 430 mm, and its battery (270 Wh = 972 000 J). The powers are chosen to
 agree with the published totals (arXiv 2503.05904): 16.9 W for sensing, processing and communication, 7 W for
@@ -28,7 +30,7 @@ from draw_factory import main as draw
 
 from react_opt.build import build
 from react_opt.geometry import load_map
-from react_opt.instance import Fleet, FleetCharger, FleetRobot, Profile
+from react_opt.instance import Fleet, FleetCharger, FleetRobot, Mission, Noise, Profile
 from react_opt.jsonio import save
 
 HORIZON_S = 240.0
@@ -72,6 +74,25 @@ def fleet(robots: int, name: str, profile: Profile, chargers: tuple[FleetCharger
     )
 
 
+def mission(robots: int, profile: Profile) -> Mission:
+    """Return the mission of the paper's evaluation: 240 s on a map that nobody knows, starting in the tunnel."""
+    start = fleet(robots, "", profile)
+    return Mission(
+        name=f"factory, {robots} robot{'s' * (robots > 1)}",
+        map="factory.yaml",
+        cell_m=10.0,
+        horizon_s=HORIZON_S,
+        step_s=STEP_S[10.0],
+        profiles=start.profiles,
+        robots=start.robots,
+        delta=0.95,
+        strategy="react",
+        postpone_below=0.3,
+        noise=Noise(speed=0.05, waiting_s=0.3, power=0.02),
+        seed=1,
+    )
+
+
 def main(folder: Path) -> None:
     """Write everything into a folder."""
     draw(folder)
@@ -82,6 +103,7 @@ def main(folder: Path) -> None:
     save(tight, folder / "fleet_3_low_battery.json")
     write_instance(folder, tight, "factory_3_10m_low_battery", 10.0)
     for robots in range(1, 5):
+        save(mission(robots, jackal(PAPER_BATTERY_J, PAPER_BATTERY_J)), folder / f"mission_{robots}.json")
         own = fleet(robots, f"{robots} Jackal{'s' * (robots > 1)}", jackal(PAPER_BATTERY_J, PAPER_BATTERY_J))
         save(own, folder / f"fleet_{robots}.json")
         for cell_m in STEP_S:

@@ -1,4 +1,4 @@
-"""A live line on standard error while a solver works; silent where that is no terminal."""
+"""Live lines on standard error while something works; silent where that is no terminal."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 
 from rich.console import Console
 from rich.live import Live
+from rich.progress import BarColumn, Progress
 from rich.text import Text
 
 from react_opt.plan import gap_of
@@ -26,5 +27,22 @@ def live_line() -> Iterator[Callable[[float, float | None, float | None], None] 
             gap = percent(gap_of(incumbent, bound))
             line = f"{elapsed_s:7.1f} s   best {shown(incumbent)}   bound {shown(bound)}   gap {gap}"
             live.update(Text(line))
+
+        yield show
+
+
+@contextlib.contextmanager
+def mission_bar(horizon_s: float) -> Iterator[Callable[[float, float], None] | None]:
+    """Yield a progress callback of simulated time (s) and coverage; None where nobody watches."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    columns = ("{task.description}", BarColumn(), "{task.completed:.0f} of at most {task.total:.0f} s")
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("known   0.0 %", total=horizon_s)
+
+        def show(t_s: float, coverage: float) -> None:
+            bar.update(task, completed=t_s, description=f"known {coverage:6.1%}")
 
         yield show

@@ -14,7 +14,6 @@ from math import hypot
 import numpy as np
 
 from react_opt.energy import RobotProfile
-from react_opt.geometry.mapfile import load_map
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.instance import Mission
 from react_opt.orchestrator.belief import RobotView
@@ -288,11 +287,3 @@ def options_of(mission: Mission) -> StrategyOptions:
         postpone_below=mission.postpone_below,
         seed=mission.seed,
     )
-
-
-def load_maps(mission: Mission, folder: str) -> tuple[OccupancyMap, OccupancyMap | None]:
-    """Return a mission's map and its prior map, whose files are named relative to the mission's folder."""
-    from pathlib import Path
-
-    prior = None if mission.prior_map is None else load_map(Path(folder) / mission.prior_map)
-    return load_map(Path(folder) / mission.map), prior
