@@ -1,4 +1,4 @@
-"""The command line: ``react-opt build | solve | check | simulate | schema | solvers``."""
+"""The command line: ``react-opt build | solve | check | simulate | show | schema | solvers``."""
 
 from __future__ import annotations
 
@@ -277,6 +277,31 @@ def simulate(
     elif output is None:
         Console().print(mission_table(summarise(trace)))
     return INTERRUPTED if trace.status == "stopped" else OK
+
+
+@app.command()
+def show(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Any file; two traces make one replay.")],
+    output: Annotated[str, typer.Option("-o", "--output", help="Picture (.png, .svg, .pdf) or page (.html) to write.")],
+    instance: Annotated[str | None, typer.Option("--instance", help="Instance of a plan, if not beside it.")] = None,
+    map_file: Annotated[str | None, typer.Option("--map", help="Occupancy map to draw below.")] = None,
+    hide_truth: Annotated[bool, typer.Option("--hide-truth", help="Leave out walls that nobody has seen.")] = False,
+) -> int:
+    """Draw a file: an instance, fleet, mission, plan or trace. The page of a trace is its replay.
+
+    Examples
+    --------
+      react-opt show plan.json -o plan.png
+
+      react-opt show plan.json --instance factory.json --map factory.yaml -o plan.svg
+
+      react-opt show react.json naive.json -o replay.html
+    """
+    from react_opt.report.show import show as show_files
+
+    for line in show_files(files, output, instance=instance, map_file=map_file, truth=not hide_truth):
+        print(line, file=sys.stderr)
+    return OK
 
 
 @app.command()

@@ -134,6 +134,9 @@ def test_several_faults_are_several_lines(run, files):
         ["check", "instance.json", "instance.json"],
         ["check", "plan.json", "plan.json"],
         ["schema", "magic"],
+        ["show", "plan.json"],
+        ["show", "plan.json", "-o", "plan.jpg"],
+        ["show", "missing.json", "-o", "plan.png"],
     ],
 )
 def test_bad_usage_is_one_line_with_exit_code_2(run, files, monkeypatch, arguments):
@@ -235,6 +238,21 @@ def test_ctrl_c_writes_the_best_plan_so_far(tmp_path):
     plan = load(tmp_path / "plan.json")
     assert plan.claim.limit == "interrupt"
     assert check(instance, plan).ok
+
+
+def test_show_draws_a_plan_with_the_instance_beside_it(run, files):
+    code, out, err = run("show", files / "plan.json", "-o", files / "plan.svg")
+    assert (code, out) == (0, "")
+    assert "instance.json" in err
+    assert (files / "plan.svg").read_text().startswith("<?xml")
+
+
+def test_show_without_matplotlib_names_what_to_install(run, files, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, out, err = run("show", files / "plan.json", "-o", files / "none.png")
+    assert (code, out) == (2, "")
+    assert err == "figures need matplotlib: pip install 'react_opt[plot]'\n"
+    assert not (files / "none.png").exists()
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that is always full is a Linux thing")

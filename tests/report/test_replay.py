@@ -1,0 +1,231 @@
+"""The replay, driven in a real browser: it plays, scrubs and shows the numbers of the trace; nothing is injected.
+
+Needs Debian's ``chromium`` and ``chromium-driver``. Where they are missing these tests are skipped, unless
+``REACT_OPT_BROWSER=required`` is set, as it is in CI.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+
+import numpy as np
+import pytest
+from small_trace import scripted
+
+from react_opt import parse, save
+from react_opt.report.replay import replay_page
+from react_opt.report.show import show
+from react_opt.trace import NEVER
+
+CHROMIUM, DRIVER = shutil.which("chromium") or shutil.which("google-chrome"), shutil.which("chromedriver")
+FLAGS = """
+    --headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking
+    --disable-component-update --disable-sync --window-size=1280,800
+"""
+MOMENTS_S = (0.0, 12.5, 42.0)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """Start one browser for all tests here."""
+    if not (CHROMIUM and DRIVER):
+        if os.environ.get("REACT_OPT_BROWSER") == "required":
+            pytest.fail("REACT_OPT_BROWSER=required, but there is no chromium or no chromedriver")
+        pytest.skip("NO BROWSER: install chromium and chromium-driver to test the replay")
+    selenium = pytest.importorskip("selenium.webdriver")
+    options = selenium.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in [*FLAGS.split(), f"--user-data-dir={tmp_path_factory.mktemp('profile')}"]:
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = selenium.Chrome(options, selenium.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture
+def opened(browser, tmp_path):
+    """Open the replay of traces; afterwards the browser must have had nothing to complain about."""
+
+    def open_(*traces):
+        page = tmp_path / "replay.html"
+        names = [tmp_path / f"{k}.json" for k, _ in enumerate(traces)]
+        for trace, name in zip(traces, names, strict=True):
+            save(trace, name)
+        show(names, page)
+        browser.get(page.as_uri())
+        until(browser, lambda: browser.execute_script("return document.body.dataset.ready") == "yes")
+        return browser
+
+    browser.get_log("browser")
+    yield open_
+    assert browser.get_log("browser") == []
+
+
+def until(browser, condition):
+    """Wait for something to become true."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    WebDriverWait(browser, 20, poll_frequency=0.05).until(lambda _: condition())
+
+
+def text(browser, name):
+    """Return what an element of the page says."""
+    return browser.execute_script("return document.getElementById(arguments[0]).textContent", name)
+
+
+def seconds(browser):
+    """Return the time that the page's clock shows, s."""
+    minutes, rest = text(browser, "clock").split(" / ")[0].split(":")
+    return 60 * int(minutes) + float(rest)
+
+
+def scrub(browser, t_s):
+    """Move the slider to a time, as a hand would."""
+    browser.execute_script(
+        "const s = document.getElementById('scrub'); s.value = arguments[0]; s.dispatchEvent(new Event('input'))", t_s
+    )
+
+
+@pytest.mark.parametrize("t_s", MOMENTS_S)
+def test_scrubbing_shows_the_numbers_of_the_trace(opened, t_s):
+    trace = scripted()
+    browser = opened(trace)
+    scrub(browser, t_s)
+    frame = [frame for frame in trace.frames if frame.t_s <= t_s][-1]
+    assert seconds(browser) == t_s
+    assert text(browser, "known-0") == f"{100 * frame.coverage:.1f} %"
+    for r, robot in enumerate(frame.robots):
+        assert int(text(browser, f"battery-0-{r}").removesuffix(" J")) == pytest.approx(robot.battery_j, abs=0.6)
+        assert text(browser, f"sensing-0-{r}") == ("on" if robot.sensing else "off")
+        pose = browser.execute_script("return poseAt(replay.traces[0], arguments[0], arguments[1])", r, t_s)
+        assert (pose["x"], pose["y"], pose["yaw"]) == pytest.approx((robot.x_m, robot.y_m, robot.yaw_rad), abs=0.006)
+    assert text(browser, "link-0-0") == ("down" if t_s == 42.0 else "up")
+
+
+@pytest.mark.parametrize("t_s", MOMENTS_S)
+def test_the_map_shows_what_is_known_by_then_and_no_more(opened, t_s):
+    trace = scripted()
+    browser = opened(trace)
+    scrub(browser, t_s)
+    known, walls = trace.known.array("<u2"), trace.truth.array("u1") & 3 == 1
+    by_then = (known != NEVER) & (known * trace.known.unit_s <= t_s + 1e-9)
+    count = "return replay.stage.pictures[0].pixels.reduce((n, pixel) => n + (arguments[0].includes(pixel) ? 1 : 0), 0)"
+    wall, free, fresh, hidden = 0xFF2A2A2A, 0xFFFFFFFF, 0xFFC8F0FF, 0xFFB4AEAC
+    assert browser.execute_script(count, [wall]) == np.count_nonzero(by_then & walls)
+    assert browser.execute_script(count, [free, fresh]) == np.count_nonzero(by_then & ~walls)
+    assert browser.execute_script(count, [hidden]) == np.count_nonzero(~by_then & walls)
+    browser.find_element("id", "walls").click()
+    assert browser.execute_script(count, [hidden]) == 0
+
+
+def test_it_plays_and_pauses_with_the_space_bar(opened):
+    browser = opened(scripted())
+    body = browser.find_element("tag name", "body")
+    body.send_keys(" ")
+    until(browser, lambda: seconds(browser) > 1)
+    body.send_keys(" ")
+    stopped = seconds(browser)
+    assert text(browser, "play") == "Play"
+    browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    assert seconds(browser) == stopped
+
+
+def test_it_plays_to_the_end_and_stops_there(opened):
+    trace = scripted()
+    browser = opened(trace)
+    scrub(browser, 59.0)
+    browser.find_element("id", "play").click()
+    until(browser, lambda: text(browser, "play") == "Play")
+    assert seconds(browser) == 60.0
+    assert text(browser, "known-0") == f"{100 * trace.frames[-1].coverage:.1f} %"
+
+
+def test_it_steps_from_decision_to_decision_with_reason_and_bound(opened):
+    browser = opened(scripted())
+    seen = []
+    for _ in range(4):
+        browser.find_element("id", "next").click()
+        seen.append((seconds(browser), text(browser, "decision-what"), text(browser, "decision-why")))
+    assert seen == [
+        (4.5, "Target taken: r1 → t1", "best worth 1.84"),
+        (15.0, "Target deferred: t2", "outbid: r2 takes t1"),
+        (26.0, "Target postponed: t2", "priority 0.4 below 1"),
+        (31.0, "Plan made", "area 1,1 explored"),
+    ]
+    assert "proven bound150" in text(browser, "claim")
+    browser.find_element("tag name", "body").send_keys("p")
+    assert seconds(browser) == 26.0
+    assert "proven bound172.5" in text(browser, "claim")
+    assert text(browser, "targets-0") == "1 taken1 postponed"
+
+
+def test_keys_move_through_time(opened):
+    from selenium.webdriver.common.keys import Keys
+
+    browser = opened(scripted())
+    body = browser.find_element("tag name", "body")
+    for key, t_s in ((Keys.END, 60.0), (Keys.ARROW_LEFT, 59.0), (Keys.HOME, 0.0), (Keys.ARROW_RIGHT, 1.0)):
+        body.send_keys(key)
+        assert seconds(browser) == t_s
+    body.send_keys(Keys.SHIFT + Keys.ARROW_RIGHT)
+    assert seconds(browser) == 11.0
+
+
+def test_two_traces_play_side_by_side(opened):
+    one, other = scripted(), scripted(coarse=8, name="coarser")
+    browser = opened(one, other)
+    scrub(browser, 30.0)
+    for k, trace in enumerate((one, other)):
+        frame = next(frame for frame in trace.frames if frame.t_s == 30.0)
+        assert text(browser, f"known-{k}") == f"{100 * frame.coverage:.1f} %"
+    assert "coarser" in text(browser, "title")
+
+
+def test_text_from_files_is_shown_and_never_run(opened):
+    evil = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">'
+    data = scripted(name="x").model_dump(mode="json", by_alias=True)
+    data["mission"]["name"] = data["mission"]["strategy"] = evil
+    data["events"][0]["reason"] = data["events"][1]["target"] = evil
+    for event in data["events"]:
+        if event.get("claim"):
+            event["claim"]["method"] = evil
+    browser = opened(parse(data))
+    scrub(browser, 2.0)
+    assert browser.execute_script("return window.hacked") is None
+    assert browser.find_elements("tag name", "img") == []
+    assert text(browser, "title") == evil
+    assert evil in text(browser, "decision-what")
+    assert evil in text(browser, "claim")
+
+
+@pytest.mark.parametrize("size", [(1600, 1000), (1024, 640), (420, 800)])
+def test_nothing_is_cut_off_at_any_size(opened, size):
+    browser = opened(scripted())
+    browser.set_window_size(*size)
+    wide = browser.execute_script("return [document.documentElement.scrollWidth, window.innerWidth]")
+    browser.set_window_size(1280, 800)
+    assert wide[0] <= wide[1]
+
+
+# --- without a browser ---
+
+
+def test_a_page_is_small_the_same_on_every_run_and_loads_nothing():
+    trace = scripted(coarse=2)
+    page = replay_page([trace])
+    assert page == replay_page([trace])
+    assert len(page) < 70_000
+    assert not re.search(r"""(src|href)\s*=|https?://|url\(|@import""", page)
+
+
+def test_walls_that_nobody_saw_can_be_kept_out_of_the_page():
+    from react_opt.report.replay import _payload
+
+    trace = scripted()
+    pixels = trace.truth.model_copy(update={"data": _payload(trace, truth=False)["truth"]}).array("u1")
+    never = trace.known.array("<u2") == NEVER
+    assert (pixels[never] == 3).all()
+    assert (pixels[~never] == trace.truth.array("u1")[~never]).all()
