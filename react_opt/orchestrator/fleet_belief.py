@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from math import ceil, floor
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from react_opt.energy import RobotProfile
 from react_opt.geometry.occupancy import FREE, OCCUPIED, OccupancyMap
 from react_opt.geometry.raycast import ray_table, rays_px, unknown_ahead_px
 from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget, RobotView
 from react_opt.orchestrator.belief_areas import Areas
+from react_opt.orchestrator.belief_avoid import SLOWER, first_clear, without_discs
 from react_opt.orchestrator.belief_map import BeliefMap
 from react_opt.orchestrator.belief_paths import Field, nearest_block, search, slowness, way_to
 from react_opt.orchestrator.belief_regions import flood
@@ -25,6 +26,8 @@ from react_opt.orchestrator.belief_regions import flood
 SNAP_M = 0.5
 """A point is driven to, or left from, at the nearest place within this where the robot can stand."""
 
+IntArray = NDArray[np.int64]
+Slowness = NDArray[np.float32]
 _LOOK_RAYS = 360
 
 
@@ -60,7 +63,7 @@ class FleetBelief:
         self._profiles = sorted(dict.fromkeys(profiles), key=lambda profile: profile.radius_m)
         radii = tuple(sorted({profile.radius_m for profile in self._profiles}))
         self._layer = {profile: radii.index(profile.radius_m) for profile in self._profiles}
-        cap = max([0.5, *(max(p.full_speed_clearance_m, p.radius_m) for p in self._profiles)])
+        cap = max(max(p.full_speed_clearance_m, 3 * p.radius_m) for p in self._profiles)
         corners = frame.world_to_pixel(np.array(extent_m, dtype=np.float64).reshape(2, 2))
         low, high = corners.min(axis=0), corners.max(axis=0)
         room = ceil(1.0 / frame.resolution_m)
@@ -70,7 +73,7 @@ class FleetBelief:
         self._robots: dict[str, RobotView] = {}
         self._reported = 0
         self._fresh = (-1, -1)
-        self._slow: dict[tuple[int, bool], np.ndarray] = {}
+        self._slow: dict[tuple[int, bool], Slowness] = {}
         self._fields: dict[tuple[int, bool, int], Field] = {}
         self._marks = np.zeros((1, 1), dtype=np.int32)
         self._mark = 0
@@ -182,11 +185,7 @@ class FleetBelief:
         if goal < 0:
             return ()
         field = self._field(robot.profile, self._start(robot.profile, (robot.x_m, robot.y_m), optimistic), optimistic)
-        way = way_to(slow, field[2], field[0], int(goal), self._side_m)
-        if way.size == 0:
-            return ()
-        points = [(float(x), float(y)) for x, y in self._map.centres_m(way)]
-        return ((robot.x_m, robot.y_m), *points[(1 if len(points) > 1 else 0) :])
+        return self._way(slow, field, int(goal), robot)
 
     def table(self, profile: RobotProfile, points_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return time (s) and energy (J) between ``(n, 2)`` points over known-free space as ``(n, n)``, NaN: no way."""
@@ -199,6 +198,45 @@ class FleetBelief:
                 times[n], energies[n] = self._read(profile, field, points, False)
         return times, energies
 
+    def detour(
+        self, robot: RobotView, goal_m: tuple[float, float], blocked: ArrayLike, slower: ArrayLike
+    ) -> tuple[float, tuple[tuple[float, float], ...]]:
+        """Return time (s, infinite without a way) and way points of a drive around others in known-free space.
+
+        Parameters
+        ----------
+        robot, goal_m
+            Who drives where.
+        blocked, slower
+            ``(n, 3)`` discs (x, y, radius, m) that its centre stays out of, and those that it rather avoids.
+        """
+        slow = without_discs(self._slowness(robot.profile, False), self._discs(slower), SLOWER)
+        slow = without_discs(slow, self._discs(blocked), 0.0)
+        (goal,) = self._blocks(slow, [goal_m])
+        if goal < 0:
+            return np.inf, ()
+        field = self._search(slow, robot)
+        return float(field[0][goal]), self._way(slow, field, int(goal), robot)
+
+    def refuge(
+        self, robot: RobotView, blocked: ArrayLike, way: ArrayLike, longest_s: float
+    ) -> tuple[tuple[float, float], ...]:
+        """Return way points to the place reached soonest that lies off another robot's way; empty without one.
+
+        Parameters
+        ----------
+        robot
+            Who has to give way.
+        blocked, way
+            ``(n, 3)`` discs (x, y, radius, m): those of other robots, and those along the way to be left free.
+        longest_s
+            Places further away do not count, s.
+        """
+        slow = without_discs(self._slowness(robot.profile, False), self._discs(blocked), 0.0)
+        field = self._search(slow, robot)
+        place = first_clear(field[0], slow.shape[1], self._discs(way), longest_s)
+        return () if place < 0 else self._way(slow, field, int(place), robot)
+
     def would_see(self, point_m: tuple[float, float], range_m: float) -> int:
         """Return how many unknown pixels a scan from a point would reveal if unknown space were free."""
         cells = self._map.cells
@@ -209,6 +247,16 @@ class FleetBelief:
         reach = range_m / self._map.frame.resolution_m
         table = ray_table(_LOOK_RAYS)
         return int(unknown_ahead_px(cells, x, y, 1.0, 0.0, table, reach, self._marks, self._mark, cells.size))
+
+    def clearance_m(self, points_m: ArrayLike) -> FloatArray:
+        """Return the distance from ``(n, 2)`` points to what is known (or said) to be occupied, m.
+
+        As of the block that each lies in, up to about three robot radii.
+        """
+        pixels = self._map.to_canvas(np.asarray(points_m, dtype=np.float64).reshape(-1, 2)) // self._map.k
+        rows, cols = self._map.clear.shape
+        at = np.clip(pixels, 0, (cols - 1, rows - 1)).astype(np.int64)
+        return np.asarray(self._map.clear[at[:, 1], at[:, 0]] * self._map.frame.resolution_m, dtype=np.float64)
 
     # --- how it is worked out ---
 
@@ -225,7 +273,7 @@ class FleetBelief:
         reached = [flood(self._map.passable(0, unknown), self._starts(alive, unknown)) for unknown in (False, True)]
         self._areas.refresh(reached[0], reached[1])
 
-    def _starts(self, robots: Sequence[RobotView], optimistic: bool) -> np.ndarray:
+    def _starts(self, robots: Sequence[RobotView], optimistic: bool) -> IntArray:
         starts = [self._start(robot.profile, (robot.x_m, robot.y_m), optimistic) for robot in robots]
         return np.array(starts, dtype=np.int64)
 
@@ -238,12 +286,12 @@ class FleetBelief:
         x, y = self._map.to_canvas(point_m) / self._map.k
         return min(max(int(y), 0), rows - 1) * cols + min(max(int(x), 0), cols - 1)
 
-    def _blocks(self, slow: np.ndarray, points_m: ArrayLike) -> np.ndarray:
+    def _blocks(self, slow: Slowness, points_m: ArrayLike) -> IntArray:
         pixels = self._map.to_canvas(np.asarray(points_m, dtype=np.float64).reshape(-1, 2)) / self._map.k
         reach = SNAP_M / self._side_m
         return np.array([nearest_block(slow, x, y, reach) for x, y in pixels], dtype=np.int64)
 
-    def _slowness(self, profile: RobotProfile, optimistic: bool) -> np.ndarray:
+    def _slowness(self, profile: RobotProfile, optimistic: bool) -> Slowness:
         self._forget()
         key = (self._profiles.index(profile), optimistic)
         if key not in self._slow:
@@ -258,6 +306,25 @@ class FleetBelief:
             every = np.empty(0, dtype=np.int64)
             self._fields[key] = search(slow, start, self._side_m, profile.speed_max_m_s, every)
         return self._fields[key]
+
+    def _search(self, slow: Slowness, robot: RobotView) -> Field:
+        start = self._start(robot.profile, (robot.x_m, robot.y_m), False)
+        return search(slow, start, self._side_m, robot.profile.speed_max_m_s, np.empty(0, dtype=np.int64))
+
+    def _way(self, slow: Slowness, field: Field, goal: int, robot: RobotView) -> tuple[tuple[float, float], ...]:
+        """Return the way points of a field to a block, the robot's place first; empty where there is no way."""
+        way = way_to(slow, field[2], field[0], goal, self._side_m)
+        if way.size == 0:
+            return ()
+        points = [(float(x), float(y)) for x, y in self._map.centres_m(way)]
+        return ((robot.x_m, robot.y_m), *points[(1 if len(points) > 1 else 0) :])
+
+    def _discs(self, discs: ArrayLike) -> FloatArray:
+        """Return discs in blocks of the canvas."""
+        rows = np.array(discs, dtype=np.float64).reshape(-1, 3)
+        rows[:, :2] = self._map.to_canvas(rows[:, :2]) / self._map.k
+        rows[:, 2] /= self._side_m
+        return rows
 
     def _forget(self) -> None:
         if getattr(self, "_planned", -1) != self._map.version:

@@ -22,6 +22,7 @@ from react_opt.orchestrator.registry import make_strategy
 from react_opt.orchestrator.strategy import Decision, Order, Strategy, StrategyOptions
 from react_opt.sim.record import Recorder
 from react_opt.sim.robot import SimRobot
+from react_opt.sim.rules import Rules
 from react_opt.sim.sensing import Lidars
 from react_opt.sim.traffic import Traffic
 from react_opt.sim.world import World
@@ -30,6 +31,7 @@ from react_opt.trace import Trace
 TICK_S = 0.125
 SCAN_S = 0.25
 DECIDE_S = 1.0
+RULES_S = 0.25
 FRAME_S = 1.0
 _PROGRESS_M = 0.3  # a robot that has not moved so far for stuck_s is stuck
 _CHARGE_M = 0.5  # a robot charges when it stands within this of a charger
@@ -87,6 +89,7 @@ class Simulation:
         self.lidars = Lidars(mission, self.world)
         self.traffic = Traffic(self.world, self.robots, mission.blocking)
         self.record = Recorder(mission, self.world, SCAN_S)
+        self.rules = Rules(self.world, self.robots, self.belief, self.record) if mission.blocking else None
         self._fleet_map = self.lidars.blank()
         self._deaths = {failure.robot: failure.t_s for failure in mission.failures}
         self._ticks = 0
@@ -130,6 +133,8 @@ class Simulation:
         if self._over():
             self._end()
             return
+        if self.rules is not None and len(self.robots) > 1 and self._every(RULES_S):
+            self._clocked("traffic", self._apply_rules)
         self._clocked("drive", self._drive)
         self._ticks += 1
 
@@ -207,6 +212,9 @@ class Simulation:
             if self.mission.noise.waiting_s and order.path_m:
                 robot.wait_s = float(robot.rng.exponential(self.mission.noise.waiting_s))
         robot.order = order
+        if robot.yields_to is not None and order.path_m:
+            return  # it goes on with its new order when the other robot has passed
+        robot.yields_to = None
         pixels = self.world.map.world_to_pixel(np.array(order.path_m).reshape(-1, 2)) * self.world.map.resolution_m
         robot.follow([(float(u), float(v)) for u, v in pixels])
         if robot.state != "driving" or not robot.path:
@@ -218,8 +226,12 @@ class Simulation:
         x, y = self.world.map.pixel_to_world((robot.u_m / unit, robot.v_m / unit))
         return RobotView(
             robot.id, robot.profile, float(x), float(y), robot.heading_rad + self.world.map.origin_yaw_rad,
-            robot.battery_j, robot.state, robot.target, robot.sensing, self.t_s,
+            robot.battery_j, "yielding" if robot.yields_to else robot.state, robot.target, robot.sensing, self.t_s,
         )  # fmt: skip
+
+    def _apply_rules(self) -> None:
+        assert self.rules is not None
+        self.rules.apply(self.t_s, {robot.id: self._view(robot) for robot in self.robots})
 
     def _drive(self) -> None:
         """Move all robots by one tick, draw their energy, and see who has arrived or is stuck."""
@@ -234,11 +246,11 @@ class Simulation:
             robot.spend(TICK_S)
             robot.wait_s = max(0.0, robot.wait_s - TICK_S)
             u, v, since = robot.anchor
-            if hypot(robot.u_m - u, robot.v_m - v) > _PROGRESS_M or not robot.path:
+            if hypot(robot.u_m - u, robot.v_m - v) > _PROGRESS_M or not (robot.path or robot.yields_to):
                 robot.anchor = (robot.u_m, robot.v_m, self.t_s)
             elif self.t_s - since > self.mission.stuck_s:
                 self._abandon(robot)
-            if robot.state == "driving" and not robot.path:
+            if robot.state == "driving" and not robot.path and robot.yields_to is None:
                 robot.state = "idle"
                 self._news = True
 
@@ -249,6 +261,7 @@ class Simulation:
             reason=f"no progress for {self.mission.stuck_s:g} s",
         )  # fmt: skip
         robot.halt()
+        robot.yields_to = None
         robot.state = "stuck"
         robot.anchor = (robot.u_m, robot.v_m, self.t_s)
         self._news = True

@@ -67,6 +67,10 @@ class SimRobot:
     wait_s: float = 0.0
     speed_factor: float = 1.0
     power_factor: float = 1.0
+    yields_to: str | None = None
+    """The robot it makes way for, None while it follows its order."""
+    cap_m_s: float = inf
+    """Largest speed that traffic leaves it."""
     anchor: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where and when it last made progress: u, v and t."""
 

@@ -106,9 +106,7 @@ def summarise(trace: Trace, milestones: tuple[float, ...] = MILESTONES) -> Summa
             Milestone(
                 coverage=share,
                 t_s=at if known else None,
-                energy_j=round(sum(spent_j(trace, n, at) for n in range(len(trace.mission.robots))), 2)
-                if known
-                else None,
+                energy_j=spent if known else None,
             )
         )
     last = trace.frames[-1] if trace.frames else None

@@ -1,10 +1,11 @@
-"""How robots move among walls and each other."""
+"""How robots move among walls and each other: none enters a wall or another robot, and none brakes too late."""
 
 from __future__ import annotations
 
 from math import cos, hypot, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from react_opt.energy import speed_at
 from react_opt.geometry.inflation import clearance_px
@@ -14,7 +15,7 @@ from react_opt.sim.world import World, footprint_free
 
 
 class Traffic:
-    """Moves robots tick by tick: none enters a wall or another robot.
+    """Moves robots tick by tick.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ class Traffic:
             clear_m, profile.radius_m, profile.full_speed_clearance_m, profile.speed_min_m_s, profile.speed_max_m_s
         )
         before = robot.heading_rad
-        speed, turning, heading, length = robot.plan_motion(dt, cap)
+        speed, turning, heading, length = robot.plan_motion(dt, min(cap, robot.cap_m_s))
         u, v = robot.u_m + length * cos(heading), robot.v_m + length * sin(heading)
         if length > 0 and self._free(robot, u, v, heading):
             robot.u_m, robot.v_m, robot.heading_rad = u, v, heading
@@ -63,16 +64,16 @@ class Traffic:
         if not footprint_free(self._world.blocked, x, y, cos(heading), sin(heading), half_l, half_w):
             return False
         return not self._blocking or not any(
-            self._too_near(robot, other, u, v) for other in self._robots if other is not robot
+            _too_near(robot, other, u, v) for other in self._robots if other is not robot
         )
 
-    @staticmethod
-    def _too_near(robot: SimRobot, other: SimRobot, u: float, v: float) -> bool:
-        least = robot.profile.radius_m + other.profile.radius_m
-        gap = hypot(u - other.u_m, v - other.v_m)
-        return gap < least and gap < hypot(robot.u_m - other.u_m, robot.v_m - other.v_m)
+
+def _too_near(robot: SimRobot, other: SimRobot, u: float, v: float) -> bool:
+    least = robot.profile.radius_m + other.profile.radius_m
+    gap = hypot(u - other.u_m, v - other.v_m)
+    return gap < least and gap < hypot(robot.u_m - other.u_m, robot.v_m - other.v_m)
 
 
 @kernel
-def _clearance(clearance_m: np.ndarray, x: float, y: float) -> float:
+def _clearance(clearance_m: NDArray[np.float32], x: float, y: float) -> float:
     return clearance_px(clearance_m, x, y)

@@ -1,0 +1,294 @@
+"""The rules of the road: who makes way when robots meet, and who enters a narrow passage first.
+
+Robots tell each other where they are and where they are going. Four times a second, in this order:
+
+1. **Narrow passages are reserved.** A stretch of a robot's way where two robots cannot pass each other belongs to the
+   first robot that comes within :data:`CLAIM_M` of it (in the mission's order where several come at once), until it
+   has left it. Robots that go the same way may follow; one that would come against it waits before the entry.
+2. **Who follows keeps its distance.** A robot whose way is taken by one that drives the same way brakes behind it.
+3. **Who meets another, one of the two makes way.** Priority, from the highest: a robot that another one makes way for
+   stands above all that the other meets (so priority is handed on along a queue); a robot inside a reserved passage
+   before one outside; a driving one before a standing one; the earlier in the mission's order. The lower one
+   (a) drives around the other, where that costs at most :data:`DETOUR_S` more, else
+   (b) pulls over: it drives to the nearest place off the other's way, backwards along its own way if need be, and goes
+   on when the other has passed, after :data:`HOLD_S` at the latest; and where there is no such place
+   (c) the roles change, and the higher one makes way.
+4. **Dead robots are driven around**; where that is not possible the robot waits, gets stuck, and abandons its target.
+"""
+
+from __future__ import annotations
+
+import itertools
+from math import hypot, inf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.orchestrator.belief import RobotView
+from react_opt.orchestrator.fleet_belief import FleetBelief
+from react_opt.sim.record import Recorder
+from react_opt.sim.robot import Point, SimRobot
+from react_opt.sim.world import World
+
+CLAIM_M = 1.5
+DETOUR_S = 6.0
+HOLD_S = 15.0
+LOOK_M = 3.0
+"""How far ahead along its way a robot looks for others."""
+
+MARGIN_M = 0.06
+"""Room between two robots that pass each other."""
+
+_SAMPLE_M = 0.1
+_FAR_M = 15.0  # the part of a way that others keep free
+_REFUGE_S = 40.0
+_RETRY_S = 1.0
+
+Points = NDArray[np.float64]
+
+
+class Rules:
+    """Caps the robots' speeds and lets them make way, by the rules of this module.
+
+    Parameters
+    ----------
+    world, robots, belief, record
+        The mission's.
+    """
+
+    def __init__(self, world: World, robots: list[SimRobot], belief: FleetBelief, record: Recorder) -> None:
+        self._world = world
+        self._robots = robots
+        self._belief = belief
+        self._record = record
+        self._by_id = {robot.id: robot for robot in robots}
+        self._place = {robot.id: n for n, robot in enumerate(robots)}
+        self._claims: dict[str, tuple[Points, Point]] = {}
+        self._since: dict[str, float] = {}
+        self._tried: dict[tuple[str, str], float] = {}
+        self._heir: dict[str, str] = {}
+        self._ways: dict[str, Points] = {}
+
+    def apply(self, t_s: float, views: dict[str, RobotView]) -> None:
+        """Apply the rules at an instant.
+
+        Parameters
+        ----------
+        t_s
+            Now, s.
+        views
+            The robots as the belief sees them.
+        """
+        moving = [robot for robot in self._robots if robot.alive]
+        self._ways = {robot.id: self._way(robot) for robot in moving}
+        for robot in moving:
+            robot.cap_m_s = inf
+            if robot.yields_to is not None:
+                self._hold(robot, t_s, views)
+        for robot in moving:
+            self._claim(robot)
+        for robot in moving:
+            self._look_ahead(robot, t_s, views)
+
+    # --- ways ---
+
+    def _way(self, robot: SimRobot) -> Points:
+        """Return points along a robot's way every ``_SAMPLE_M``, itself first, as far as ``_FAR_M``."""
+        return sampled([(robot.u_m, robot.v_m), *robot.path], _SAMPLE_M, _FAR_M)
+
+    def _order_way(self, robot: SimRobot, view: RobotView) -> list[Point]:
+        """Return the way to the end of a robot's order, from where it is now."""
+        if robot.order is None or not robot.order.path_m:
+            return []
+        goal = robot.order.path_m[-1]
+        path = self._belief.path(view, goal) or self._belief.path(view, goal, optimistic=True)
+        return self._grid(path)
+
+    def _grid(self, path_m: tuple[Point, ...]) -> list[Point]:
+        unit = self._world.map.resolution_m
+        pixels = self._world.map.world_to_pixel(np.array(path_m, dtype=np.float64).reshape(-1, 2)) * unit
+        return [(float(u), float(v)) for u, v in pixels]
+
+    def _discs(self, points: Points, radius: float) -> Points:
+        """Return discs (world x, y, radius) on grid points."""
+        unit = self._world.map.resolution_m
+        places = self._world.map.pixel_to_world(points.reshape(-1, 2) / unit)
+        return np.column_stack((places, np.full(len(places), radius)))
+
+    @staticmethod
+    def _room(one: SimRobot, other: SimRobot) -> float:
+        return one.profile.radius_m + other.profile.radius_m + MARGIN_M
+
+    # --- rule 1 ---
+
+    def _narrow(self, robot: SimRobot, way: Points) -> NDArray[np.bool_]:
+        """Tell for each point of a way whether two robots cannot pass each other there."""
+        widest = max(other.profile.radius_m for other in self._robots)
+        unit = self._world.map.resolution_m
+        clear = self._belief.clearance_m(self._world.map.pixel_to_world(way / unit))
+        return np.asarray(clear < robot.profile.radius_m + widest + MARGIN_M / 2)
+
+    def _claim(self, robot: SimRobot) -> None:
+        """Claim the next narrow stretch, or cap the speed to stop before it."""
+        way = self._ways[robot.id]
+        self._claims.pop(robot.id, None)
+        if len(way) < 2:
+            return
+        near = way[: int((CLAIM_M + LOOK_M) / _SAMPLE_M)]
+        narrow = self._narrow(robot, near)
+        if not narrow.any():
+            return
+        first = int(np.argmax(narrow))
+        if first * _SAMPLE_M > CLAIM_M:
+            return
+        after = np.flatnonzero(~narrow[first:])
+        last = first + int(after[0]) if len(after) else len(near) - 1
+        stretch = near[first : last + 1]
+        along = (float(stretch[-1, 0] - stretch[0, 0]), float(stretch[-1, 1] - stretch[0, 1]))
+        for other in self._robots:
+            if other is robot or other.id not in self._claims or first == 0:
+                continue
+            theirs, their_way = self._claims[other.id]
+            if along[0] * their_way[0] + along[1] * their_way[1] > 0:
+                continue
+            gaps = np.hypot(*(stretch[:, None, :] - theirs[None, :, :]).transpose(2, 0, 1))
+            if gaps.min() < 0.3:
+                self._cap(robot, first * _SAMPLE_M - 0.3)
+                return
+        self._claims[robot.id] = (stretch, along)
+
+    def _cap(self, robot: SimRobot, room_m: float) -> None:
+        """Cap a robot's speed so that it can stop within a distance."""
+        cap = sqrt(2 * 0.8 * robot.profile.accel_m_s2 * max(room_m, 0.0))
+        robot.cap_m_s = min(robot.cap_m_s, cap)
+
+    # --- rules 2 to 4 ---
+
+    def _look_ahead(self, robot: SimRobot, t_s: float, views: dict[str, RobotView]) -> None:
+        way = self._ways[robot.id]
+        if len(way) < 2:
+            return
+        near = way[: int(LOOK_M / _SAMPLE_M) + 1]
+        for other in self._robots:
+            if other is robot:
+                continue
+            room = self._room(robot, other)
+            gaps = np.hypot(near[:, 0] - other.u_m, near[:, 1] - other.v_m)
+            ahead = np.flatnonzero(gaps < room - 0.01)
+            if len(ahead) == 0 or (gaps[0] < room and gaps[min(3, len(gaps) - 1)] > gaps[0]):
+                continue  # nobody there, or it drives away from the other
+            at = int(ahead[0])
+            self._cap(robot, at * _SAMPLE_M)
+            if self._follows(near, at, other):
+                continue
+            self._meet(robot, other, t_s, views)
+
+    def _follows(self, way: Points, at: int, other: SimRobot) -> bool:
+        """Tell whether another robot drives the way that leads to it."""
+        theirs = self._ways.get(other.id)
+        if theirs is None or len(theirs) < 4:
+            return False
+        step = way[min(at + 3, len(way) - 1)] - way[max(at - 3, 0)]
+        ahead = theirs[min(6, len(theirs) - 1)] - theirs[0]
+        norm = hypot(*step) * hypot(*ahead)
+        return norm > 0 and float(step @ ahead) / norm > 0.3
+
+    def _rank(self, robot: SimRobot) -> tuple[int, ...]:
+        """Return a robot's priority; smaller goes first. One that makes way ranks just below whom it makes way for."""
+        own = self._own_rank(robot)
+        above = self._heir.get(robot.id)
+        return own if above is None else min(own, (*self._own_rank(self._by_id[above]), 1))
+
+    def _own_rank(self, robot: SimRobot) -> tuple[int, ...]:
+        return (0 if self._inside(robot) else 1, 0 if robot.path else 1, self._place[robot.id])
+
+    def _inside(self, robot: SimRobot) -> bool:
+        claim = self._claims.get(robot.id)
+        return claim is not None and hypot(claim[0][0, 0] - robot.u_m, claim[0][0, 1] - robot.v_m) < 0.15
+
+    def _meet(self, robot: SimRobot, other: SimRobot, t_s: float, views: dict[str, RobotView]) -> None:
+        """Let one of two robots that meet make way."""
+        if not other.alive:
+            self._try(robot, other, t_s, views, dead=True)
+            return
+        first, second = (robot, other) if self._rank(robot) <= self._rank(other) else (other, robot)
+        if second.yields_to == first.id or first.yields_to == second.id:
+            return  # it is on its way
+        if not self._try(second, first, t_s, views):
+            self._try(first, second, t_s, views)
+
+    def _try(
+        self, robot: SimRobot, other: SimRobot, t_s: float, views: dict[str, RobotView], dead: bool = False
+    ) -> bool:
+        """Let a robot make way for another one; tell whether it could."""
+        if t_s < self._tried.get((robot.id, other.id), -inf) + _RETRY_S:
+            return False
+        self._tried[robot.id, other.id] = t_s
+        view = views[robot.id]
+        others = [one for one in self._robots if one is not robot]
+        bodies = np.concatenate([self._discs(np.array([(one.u_m, one.v_m)]), self._room(robot, one)) for one in others])
+        way = self._ways.get(other.id, np.array([(other.u_m, other.v_m)]))
+        corridor = self._discs(way, self._room(robot, other))
+        if robot.order is not None and robot.order.path_m and robot.path:
+            goal = robot.order.path_m[-1]
+            straight = self._belief.detour(view, goal, np.empty((0, 3)), np.empty((0, 3)))[0]
+            time, path = self._belief.detour(view, goal, bodies, corridor[::2])
+            if path and (dead or time <= straight + DETOUR_S):
+                self._tell(robot, other, t_s, "goes around")
+                robot.follow(self._grid(path))
+                self._ways[robot.id] = self._way(robot)
+                return True
+        if dead:
+            return False
+        path = self._belief.refuge(view, bodies, corridor[::2], _REFUGE_S)
+        if not path:
+            return False
+        self._tell(robot, other, t_s, "pulls over")
+        robot.follow(self._grid(path))
+        self._ways[robot.id] = self._way(robot)
+        if robot.order is not None and robot.order.path_m:
+            robot.yields_to = other.id
+            self._since[robot.id] = t_s
+        self._heir[robot.id] = other.id
+        return True
+
+    def _tell(self, robot: SimRobot, other: SimRobot, t_s: float, how: str) -> None:
+        self._record.event(t_s, "yield", robot=robot.id, target=robot.target, reason=f"{how}: {other.id} comes first")
+
+    def _hold(self, robot: SimRobot, t_s: float, views: dict[str, RobotView]) -> None:
+        """Let a robot that made way go on when the other has passed."""
+        assert robot.yields_to is not None
+        other = self._by_id[robot.yields_to]
+        late = t_s > self._since[robot.id] + HOLD_S
+        if robot.path and not late and other.alive and other.path:
+            return  # still on its way to the side
+        if not late and other.alive and other.path:
+            mine = self._order_way(robot, views[robot.id])
+            ahead = sampled([(robot.u_m, robot.v_m), *mine], _SAMPLE_M, LOOK_M)
+            theirs = self._ways[other.id]
+            gaps = np.hypot(*(ahead[:, None, :] - theirs[None, :, :]).transpose(2, 0, 1))
+            if gaps.min() < self._room(robot, other):
+                return
+        robot.yields_to = None
+        self._heir.pop(robot.id, None)
+        robot.follow(self._order_way(robot, views[robot.id]))
+        self._ways[robot.id] = self._way(robot)
+
+
+def sampled(points: list[Point], step_m: float, far_m: float) -> Points:
+    """Return points every ``step_m`` along a polyline, as far as ``far_m``, and its end where that is nearer."""
+    out = [points[0]]
+    left, total = step_m, 0.0
+    for (x0, y0), (x1, y1) in itertools.pairwise(points):
+        length = hypot(x1 - x0, y1 - y0)
+        at = left
+        while at <= length:
+            out.append((x0 + (x1 - x0) * at / length, y0 + (y1 - y0) * at / length))
+            at += step_m
+            total += step_m
+            if total >= far_m:
+                return np.array(out)
+        left = at - length
+    if len(points) > 1 and points[-1] != out[-1]:
+        out.append(points[-1])
+    return np.array(out)
