@@ -1,14 +1,12 @@
-"""Seeded families of OROS instances, as JSON dictionaries of kind ``oros``.
-
-Nothing of react_opt is imported: the families can be handed to any other solver.
-"""
+"""Grids of cells between walls: with ample batteries, with tight ones, and with chargers."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
+
+from .registry import family
 
 STEP_S = 10.0
 IDLE_W = 2.0
@@ -17,6 +15,16 @@ MOVE_J = 70.0
 WORST_STEP_J = 239.0  # one move and one sensing
 
 
+@family(
+    "oros", "4-neighbour grids whose walls force detours; batteries cannot bind",
+    tiny={"rows": 2, "cols": 5, "robots": 2, "horizon": 24},
+    small={"rows": 4, "cols": 10, "robots": 3, "horizon": 24},
+    medium={"rows": 8, "cols": 8, "robots": 4, "horizon": 28},
+    large={"rows": 10, "cols": 10, "robots": 4, "horizon": 40},
+    huge={"rows": 20, "cols": 20, "robots": 4, "horizon": 120},
+    giant={"rows": 40, "cols": 40, "robots": 10, "horizon": 240},
+    colossal={"rows": 60, "cols": 60, "robots": 10, "horizon": 240},
+)  # fmt: skip
 def walled_grid(
     rows: int,
     cols: int,
@@ -95,71 +103,41 @@ def walled_grid(
     }
 
 
-def metric_complete(
-    n: int, robots: int, seed: int, *, horizon: int | None = None, side_m: float = 60.0
-) -> dict[str, Any]:
-    """Complete graph on random points: metric travel times, every cell with a deadline and weight of its own.
+@family(
+    "oros", "walled grids whose batteries decide who may go how far",
+    tiny={"rows": 2, "cols": 5, "robots": 2, "horizon": 24},
+    small={"rows": 5, "cols": 8, "robots": 2, "horizon": 30},
+    medium={"rows": 8, "cols": 8, "robots": 4, "horizon": 28},
+    large={"rows": 10, "cols": 10, "robots": 4, "horizon": 40},
+    huge={"rows": 20, "cols": 20, "robots": 4, "horizon": 120},
+)  # fmt: skip
+def tight_grid(rows: int, cols: int, robots: int, horizon: int, seed: int) -> dict[str, Any]:
+    """Walled grid with half the battery that moving and sensing at every step would take."""
+    instance = walled_grid(rows, cols, robots, horizon, seed, 0.5)
+    return {**instance, "name": f"tight_grid_{rows}x{cols}_r{robots}_t{horizon}_s{seed}"}
 
-    Parameters
-    ----------
-    n
-        Number of cells; the robots start in the first.
-    robots
-        Number of robots.
-    seed
-        Seed of points, weights and deadlines.
-    horizon
-        T in steps of 1 s; by default about the length of a tour shared by the robots, some hundreds of steps.
-    side_m
-        Side of the square that holds the points; robots drive 1 m/s (rounded up to whole steps, which keeps
-        the triangle inequality).
+
+@family(
+    "oros", "tight batteries, and chargers with one slot that robots share",
+    tiny={"rows": 2, "cols": 4, "robots": 2, "horizon": 14},
+    small={"rows": 3, "cols": 5, "robots": 2, "horizon": 20},
+    medium={"rows": 5, "cols": 8, "robots": 3, "horizon": 30},
+    large={"rows": 10, "cols": 10, "robots": 4, "horizon": 40},
+)  # fmt: skip
+def chargers(rows: int, cols: int, robots: int, horizon: int, seed: int) -> dict[str, Any]:
+    """Walled grid where a quarter of the battery is there and a charger stands in every 20th cell or so.
+
+    A charger gives 30 W to one robot at a time: 300 J per step of 10 s, more than a move and a sensing take.
     """
-    rng = np.random.default_rng(seed)
-    x_m, y_m = rng.uniform(0.0, side_m, (2, n))
-    if horizon is None:
-        horizon = max(200, math.ceil(1.2 * side_m * math.sqrt(n) / robots))
-    battery = horizon * 26.0 + 1.0
-    weights = rng.integers(1, 6, n)
-    deadlines = rng.integers(horizon // 4, horizon + 1, n)
+    instance = walled_grid(rows, cols, robots, horizon, seed, 0.25)
+    rng = np.random.default_rng([seed, 1])
+    places = sorted(rng.choice(rows * cols, max(1, rows * cols // 20), replace=False).tolist())
+    for robot in instance["robots"]:
+        robot["capacity_j"] = 2 * robot["battery_j"]
     return {
-        "kind": "oros",
-        "schema_version": 1,
-        "name": f"metric_complete_{n}_r{robots}_t{horizon}_s{seed}",
-        "horizon_steps": horizon,
-        "step_s": 1.0,
-        "cells": [
-            {
-                "id": f"c{i}",
-                "x_m": float(x_m[i]),
-                "y_m": float(y_m[i]),
-                "weight": float(weights[i]),
-                "deadline_step": int(deadlines[i]),
-            }
-            for i in range(n)
-        ],
-        "travel": [
-            {
-                "from": f"c{i}",
-                "to": f"c{j}",
-                "steps": steps,
-                "energy_j": 9.0 * steps,
-            }
-            for i in range(n)
-            for j in range(n)
-            if i != j
-            for steps in [max(1, math.ceil(math.hypot(x_m[i] - x_m[j], y_m[i] - y_m[j])))]
-        ],
-        "robots": [
-            {
-                "id": f"r{k}",
-                "start": "c0",
-                "battery_j": battery,
-                "capacity_j": battery,
-                "idle_w": IDLE_W,
-                "sensing_w": SENSING_W,
-            }
-            for k in range(robots)
-        ],
+        **instance,
+        "name": f"chargers_{rows}x{cols}_r{robots}_t{horizon}_s{seed}",
+        "chargers": [{"cell": instance["cells"][i]["id"], "power_w": 30.0, "slots": 1} for i in places],
     }
 
 
