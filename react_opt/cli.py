@@ -1,4 +1,4 @@
-"""The command line: ``react-opt build | solve | check | simulate | show | schema | solvers``."""
+"""The command line: ``react-opt build | solve | check | simulate | bench | show | schema | solvers``."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, NoReturn, TypeVar
 import typer
 from rich.console import Console
 
+from react_opt.cli_bench import bench
 from react_opt.errors import InputError, MissingPartError, ReactError, UsageError
 from react_opt.interrupt import Interruption
 
@@ -302,6 +303,9 @@ def show(
     for line in show_files(files, output, instance=instance, map_file=map_file, truth=not hide_truth):
         print(line, file=sys.stderr)
     return OK
+
+
+app.command()(bench)
 
 
 @app.command()

@@ -16,7 +16,7 @@ PRIZE = 10_000_000  # per unit of value: more than any sum of durations
 
 @peer(
     "pyvrp", ("inspection",), about="PyVRP's hybrid genetic search, prize-collecting", package="pyvrp",
-    missing=needs("pyvrp", EXTRA), takes=lambda instance: instance.minimise == "time",
+    missing=needs("pyvrp", EXTRA), takes=lambda instance: instance.minimise == "time", endless=True,
 )  # fmt: skip
 def pyvrp(instance: Any, limits: Limits, tell: Tell) -> Any:
     """Search until the time is up; PyVRP proves no bound."""

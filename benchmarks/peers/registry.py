@@ -57,6 +57,8 @@ class Peer:
         Says what to install, or why it cannot run here; None where it can.
     takes
         Which instances of these kinds it takes.
+    endless
+        Whether it always searches until its time is up, having no proof to end with.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Peer:
     package: str
     missing: Callable[[], str | None]
     takes: Callable[[Any], bool] = lambda instance: True
+    endless: bool = False
 
     @property
     def version(self) -> str:
@@ -96,11 +99,12 @@ def peer(
     package: str,
     missing: Callable[[], str | None] = lambda: None,
     takes: Callable[[Any], bool] = lambda instance: True,
+    endless: bool = False,
 ) -> Callable[[Solver], Solver]:
     """Register a solver ``(instance, limits, tell) -> plan``; see :class:`Peer`."""
 
     def register(solve: Solver) -> Solver:
-        PEERS[name] = Peer(name, tuple(kinds), solve, about, package, missing, takes)
+        PEERS[name] = Peer(name, tuple(kinds), solve, about, package, missing, takes, endless)
         return solve
 
     return register

@@ -16,7 +16,7 @@ FAR = 2**40
 
 @peer(
     "or-routing", ("inspection",), about="OR-tools' routing library, guided local search", package="ortools",
-    missing=needs("ortools", "pip install ortools"), takes=lambda instance: instance.minimise == "time",
+    missing=needs("ortools", "pip install ortools"), takes=lambda instance: instance.minimise == "time", endless=True,
 )  # fmt: skip
 def or_routing(instance: Any, limits: Limits, tell: Tell) -> Any:
     """Search until the time is up; the library proves no bound."""

@@ -124,3 +124,8 @@ _TINY: dict[str, Callable[[], Iterator[Document]]] = {
     "assignment": _assignment,
     "inspection": _inspection,
 }
+
+
+def tiny_instances(kind: str) -> list[Document]:
+    """Return instances of a kind that any solver solves at once: what a benchmark runs before its clock."""
+    return list(_TINY[kind]())
