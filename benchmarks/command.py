@@ -139,7 +139,7 @@ MOST_COLUMNS = 2_000_000  # of an exported model: larger MPS files fill disks
 
 def listing(peer_files: Sequence[str] = ()) -> str:
     """Return what there is: suites, families with their sizes, solvers, formats."""
-    load_peers(list(peer_files))
+    load_peers(peer_files)
     lines = ["suites"]
     for suite in SUITES.values():
         lines.append(f"  {suite.name:12} {len(suite.entries):4} instances, {suite.limit_s:g} s each: {suite.about}")

@@ -111,7 +111,7 @@ def standings(runs: Sequence[Run], exposed: Sequence[Exposure]) -> list[Standing
 def has_best(run: Run, truth: Truth) -> bool:
     """Whether no checked plan of the instance is better than this run's (up to 1e-6 of its value)."""
     if truth.best is None:
-        return run["status"] == "infeasible"
+        return bool(run["status"] == "infeasible")
     return is_right(run) and float(run["objective"]) >= truth.best - 1e-6 * abs(truth.best) - 1e-9
 
 

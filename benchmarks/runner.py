@@ -89,9 +89,7 @@ def jobs_of(suite: Suite, settings: Settings, skipped: Callable[[str], None] = l
     UsageError
         Where a solver asked for does not exist, or nothing is left to run.
     """
-    before = set(PEERS)
-    load_peers(list(settings.peer_files))
-    mine = tuple(name for name in PEERS if name not in before)
+    mine = load_peers(settings.peer_files)
     for name in settings.only:
         if name not in PEERS:
             raise UsageError(f"solver: expected one of {', '.join(PEERS)}, found {name!r}")

@@ -151,6 +151,21 @@ def test_files_stay_small(relative: Path) -> None:
     assert lines <= MOST_LINES, "split it by rule or family"
 
 
+BENCHMARKS = sorted((PACKAGE.parent / "benchmarks").rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", BENCHMARKS, ids=lambda path: str(path.relative_to(PACKAGE.parent)))
+def test_files_of_the_benchmark_stay_small(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= MOST_LINES, "split it by rule or family"
+
+
+@pytest.mark.parametrize("relative", MODULES, ids=str)
+def test_the_benchmark_stands_on_top_of_the_package(relative: Path) -> None:
+    """Only the command line and reports may call it, and only when they are asked to."""
+    found = [found for found in imports(relative) if top(found) == "benchmarks"]
+    assert all(relative.parts[0] in ("cli.py", "report") and not one.eager for one in found), found
+
+
 @pytest.mark.parametrize("statement", ["import react_opt", "from react_opt import load, check, parse"])
 def test_importing_the_package_loads_nothing_heavy(statement: str) -> None:
     """Loading and checking a file needs no solver, no compiler, no planner and no plots."""

@@ -1,0 +1,185 @@
+"""``react-opt bench`` from end to end: made-up solvers are exposed, a stopped run goes on, reports and exports hold."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from benchmarks import command, report, runner
+from benchmarks.families import FAMILIES
+from benchmarks.suites import SUITES, Suite, of_family
+from benchmarks.verdicts import exposures
+from react_opt import jsonio, solve
+from react_opt.errors import InputError, UsageError
+from react_opt.jobs_file import read_lines
+from react_opt.solvers.watch import leave_behind  # noqa: F401  (loaded before the command line asks for it)
+
+ROOT = Path(__file__).parents[2]
+LIARS = str(Path(__file__).with_name("liars.py"))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of honest and made-up solvers on an assignment and on an OROS instance, with its reports."""
+    folder = tmp_path_factory.mktemp("bench")
+    entries = [
+        *of_family("conflicts", "tiny", [1], ("react_opt", "highs")),
+        *of_family("walled_grid", "tiny", [1], ("react_opt", "highs")),
+    ]
+    suite = Suite("trial", "for the tests", 20.0, tuple(entries))
+    settings = runner.Settings(peer_files=(LIARS,), workers=2)
+    reports = [str(folder / "report.md"), str(folder / "report.html")]
+    assert command.bench(suite, settings, str(folder / "results.jsonl"), reports) == command.EXPOSED
+    return folder
+
+
+def test_made_up_solvers_are_exposed_and_honest_ones_are_not(finished: Path) -> None:
+    found = report.of_file(finished / "results.jsonl")
+    exposed = {item.peer: item for item in exposures(found.solves)}
+    assert set(exposed) == {"wrong_plan", "false_bound", "false_proof", "false_certificate"}
+    assert exposed["wrong_plan"].fault == "plan"
+    assert "beaten by a checked plan" in exposed["false_bound"].text
+    assert exposed["false_proof"].fault == "infeasible"
+    assert "its certificate proves" in exposed["false_certificate"].text
+    by = {(run["peer"], run["kind"]): run for run in found.solves}
+    assert by["react_opt", "oros"]["status"] == by["highs", "oros"]["status"] == "optimal"
+    assert by["react_opt", "oros"]["objective"] == pytest.approx(by["highs", "oros"]["objective"], rel=1e-9)
+    assert by["react_opt", "oros"]["memory_mb"] > 50
+
+
+def test_where_it_was_run_is_recorded(finished: Path) -> None:
+    (header,) = report.of_file(finished / "results.jsonl").headers
+    assert header["machine"]["cores"] >= 1
+    assert header["versions"]["react_opt"]
+    assert header["suite"] == "trial"
+    assert header["begun"].endswith("Z")
+
+
+def test_the_report_names_the_liars_and_the_losses(finished: Path) -> None:
+    for name in ("report.md", "report.html"):
+        text = (finished / name).read_text()
+        for words in ("Wrong answers", "false_bound", "is beaten by a checked plan", "react_opt loses", "Certificates"):
+            assert words in text
+    page = (finished / "report.html").read_text()
+    assert 'src="data:image/png' in page or "needs matplotlib" in page or "Scaling" not in page
+    assert "http" not in page.replace("http-equiv", "")  # opens from disk, loads nothing
+
+
+def test_a_stopped_run_goes_on_and_gives_the_same_report(finished: Path, tmp_path: Path) -> None:
+    """Of the finished file all but three runs are lost, and half a line is left of the fourth."""
+    lines = (finished / "results.jsonl").read_text().splitlines(keepends=True)
+    file = tmp_path / "results.jsonl"
+    file.write_text("".join(lines[:4]) + lines[4][:100])
+    kept = [line["key"] for line in read_lines(file) if "key" in line]
+    suite = Suite("trial", "", 20.0, tuple(of_family("conflicts", "tiny", [1], ("react_opt", "highs"))))
+    settings = runner.Settings(peer_files=(LIARS,))
+    jobs = runner.jobs_of(suite, settings)
+    ran: list[str] = []
+    records = runner.run(suite, settings, str(file), jobs, lambda record: ran.append(record.key))
+    assert len(records) == len(jobs)
+    assert ran
+    assert not set(ran) & set(kept)
+    assert set(ran) | set(kept) >= {job.key for job in jobs}
+    again = {run["key"]: run for run in report.of_file(file).solves}
+    for run in report.of_file(finished / "results.jsonl").solves:
+        if run["key"] in again:
+            mine = again[run["key"]]
+            assert (run["status"], run["objective"], run["bound"]) == (mine["status"], mine["objective"], mine["bound"])
+
+
+def test_a_killed_run_counts_as_unsolved(tmp_path: Path) -> None:
+    entry = of_family("walled_grid", "tiny", [1], ("react_opt",))
+    suite = Suite("trial", "", 20.0, tuple(entry), memory_mb=20.0)
+    jobs = runner.jobs_of(suite, runner.Settings())
+    runner.run(suite, runner.Settings(), str(tmp_path / "r.jsonl"), jobs)
+    found = report.of_file(tmp_path / "r.jsonl")
+    assert [run["status"] for run in found.solves] == ["memory"]
+    report.write(found, str(tmp_path / "r.html"))
+    assert "killed above 20 MB" in (tmp_path / "r.html").read_text()
+
+
+@pytest.mark.parametrize("name", ["walled_grid", "generalised", "inspection_tight"])
+def test_exported_models_solved_outside_agree(tmp_path: Path, name: str) -> None:
+    """The MPS file, read and solved by HiGHS alone, has the optimum that the JSON file has here."""
+    import highspy
+
+    suite = Suite("trial", "", 1.0, tuple(of_family(name, "tiny", [4], ())))
+    assert command.export(suite, str(tmp_path)) == 1
+    (file,) = tmp_path.glob("*.json")
+    plan = solve(jsonio.load(file), threads=1, explain=False)
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.setOptionValue("mip_rel_gap", 1e-9)
+    assert highs.readModel(str(file.with_suffix(".mps"))) == highspy.HighsStatus.kOk
+    highs.run()
+    value = highs.getInfo().objective_function_value
+    objective = plan.claim.objective
+    assert abs(value) == pytest.approx(objective, rel=1e-6)  # MPS files of HiGHS may hold the negated objective
+
+
+def test_text_of_files_cannot_become_script(tmp_path: Path) -> None:
+    line = {"key": "solve {}", "ending": "done", "host": "h"}
+    bad = "<script>alert(1)</script>"
+    result = {
+        "what": "solve", "instance": bad, "case": {"family": "conflicts", "parameters": {}, "seed": 1}, "kind": bad,
+        "gap_asked": 0.0, "peer": bad, "version": "1", "status": "feasible", "objective": 1.0, "bound": None,
+        "violations": [], "tolerance": None, "wall_s": 1.0, "limit_s": 2.0, "trajectory": [],
+    }  # fmt: skip
+    header = {
+        "kind": "bench_results", "suite": bad, "machine": runner.machine(), "versions": {}, "commit": None,
+        "workers": 1, "begun": "",
+    }  # fmt: skip
+    (tmp_path / "r.jsonl").write_text(json.dumps(header) + "\n" + json.dumps({**line, "result": result}) + "\n")
+    report.write(tmp_path / "r.jsonl", str(tmp_path / "r.html"))
+    assert "<script" not in (tmp_path / "r.html").read_text()
+
+
+def test_what_cannot_be_run_is_said(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected one of smoke, standard"):
+        command.suite_of(["smoek"], None)
+    with pytest.raises(UsageError, match="solver: expected one of"):
+        runner.jobs_of(SUITES["smoke"], runner.Settings(only=("nobody",)))
+    with pytest.raises(UsageError, match=r"ends in \.md or \.html"):
+        report.form_of("report.pdf")
+    with pytest.raises(InputError, match="expected a Python file that registers a solver"):
+        runner.jobs_of(SUITES["smoke"], runner.Settings(peer_files=("/nowhere.py",)))
+    (tmp_path / "empty.py").write_text("")
+    with pytest.raises(InputError, match="registers no solver"):
+        runner.jobs_of(SUITES["smoke"], runner.Settings(peer_files=(str(tmp_path / "empty.py"),)))
+    (tmp_path / "r.jsonl").write_text("{}\n")
+    with pytest.raises(InputError, match="expected results of react-opt bench"):
+        report.of_file(tmp_path / "r.jsonl")
+
+
+def test_the_command_line_refuses_a_bad_file_in_one_line(tmp_path: Path) -> None:
+    bad = tmp_path / "p.txt"
+    bad.write_text("n 3\n")
+    arguments = ["bench", "--read", "chao", str(bad), "-o", str(tmp_path / "r.jsonl")]
+    done = subprocess.run(
+        [sys.executable, "-m", "react_opt.cli", *arguments], capture_output=True, text=True, timeout=100, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [f"{bad}: expected the lines n, m and tmax"]
+    assert not (tmp_path / "r.jsonl").exists()
+
+
+def test_suites_have_their_families_and_solvers() -> None:
+    for suite in SUITES.values():
+        jobs = runner.jobs_of(suite, runner.Settings())
+        assert len({job.key for job in jobs}) == len(jobs)
+        assert all(job.time_limit_s and job.memory_limit_mb for job in jobs)
+    named = {entry.case["family"] for entry in SUITES["standard"].entries}
+    assert named == set(FAMILIES)
+
+
+def test_the_wheel_holds_the_benchmarks_and_the_map_of_the_factory() -> None:
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
+    assert "benchmarks" in build["packages"]
+    for source, target in build["force-include"].items():
+        assert (ROOT / source).is_file()
+        assert target.startswith("benchmarks/data/factory/")
