@@ -51,7 +51,7 @@ class Errands:
             if robot.state == "stuck":
                 self.abandoned += 1
             elif robot.state == "idle" and robot.target is not None:
-                if left and np.hypot(robot.x_m - left[0][0], robot.y_m - left[0][1]) < 0.6:
+                if left and np.hypot(robot.x_m - left[0][0], robot.y_m - left[0][1]) < 0.6:  # there
                     left.pop(0)
                     if not left:
                         self.finished_s[robot.id] = belief.t_s

@@ -308,7 +308,9 @@ class FleetBelief:
         return self._fields[key]
 
     def _search(self, slow: Slowness, robot: RobotView) -> Field:
-        start = self._start(robot.profile, (robot.x_m, robot.y_m), False)
+        """Search from the nearest block that is left to the robot, which may stand within a disc that is cut out."""
+        (block,) = self._blocks(slow, [(robot.x_m, robot.y_m)])
+        start = int(block) if block >= 0 else self._start(robot.profile, (robot.x_m, robot.y_m), False)
         return search(slow, start, self._side_m, robot.profile.speed_max_m_s, np.empty(0, dtype=np.int64))
 
     def _way(self, slow: Slowness, field: Field, goal: int, robot: RobotView) -> tuple[tuple[float, float], ...]:

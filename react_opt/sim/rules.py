@@ -5,7 +5,8 @@ Robots tell each other where they are and where they are going. Four times a sec
 1. **Narrow passages are reserved.** A stretch of a robot's way where two robots cannot pass each other belongs to the
    first robot that comes within :data:`CLAIM_M` of it (in the mission's order where several come at once), until it
    has left it. Robots that go the same way may follow; one that would come against it waits before the entry.
-2. **Who follows keeps its distance.** A robot whose way is taken by one that drives the same way brakes behind it.
+2. **Who follows keeps its distance.** A robot whose way is taken by one that drives the same way brakes behind it;
+   one that stands still for more than :data:`PATIENCE_S` is no longer followed but met.
 3. **Who meets another, one of the two makes way.** Priority, from the highest: a robot that another one makes way for
    stands above all that the other meets (so priority is handed on along a queue); a robot inside a reserved passage
    before one outside; a driving one before a standing one; the earlier in the mission's order. The lower one
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 from react_opt.orchestrator.belief import RobotView
 from react_opt.orchestrator.fleet_belief import FleetBelief
 from react_opt.sim.record import Recorder
-from react_opt.sim.robot import Point, SimRobot
+from react_opt.sim.robot import ARRIVED_M, Point, SimRobot
 from react_opt.sim.world import World
 
 CLAIM_M = 1.5
@@ -37,7 +38,13 @@ LOOK_M = 3.0
 """How far ahead along its way a robot looks for others."""
 
 MARGIN_M = 0.06
-"""Room between two robots that pass each other."""
+"""Room that is planned for between two robots that pass each other."""
+
+TOUCH_M = 0.01
+"""Robots that would come nearer than this meet."""
+
+PATIENCE_S = 2.0
+"""A robot that follows another one waits so long when that one stands still."""
 
 _SAMPLE_M = 0.1
 _FAR_M = 15.0  # the part of a way that others keep free
@@ -63,6 +70,7 @@ class Rules:
         self._record = record
         self._by_id = {robot.id: robot for robot in robots}
         self._place = {robot.id: n for n, robot in enumerate(robots)}
+        self._still = dict.fromkeys(self._by_id, 0.0)
         self._claims: dict[str, tuple[Points, Point]] = {}
         self._since: dict[str, float] = {}
         self._tried: dict[tuple[str, str], float] = {}
@@ -79,6 +87,9 @@ class Rules:
         views
             The robots as the belief sees them.
         """
+        for robot in self._robots:
+            if robot.speed_m_s > 0.0 or robot.turning_rad_s != 0.0:
+                self._still[robot.id] = t_s
         moving = [robot for robot in self._robots if robot.alive]
         self._ways = {robot.id: self._way(robot) for robot in moving}
         for robot in moving:
@@ -172,14 +183,13 @@ class Rules:
         for other in self._robots:
             if other is robot:
                 continue
-            room = self._room(robot, other)
             gaps = np.hypot(near[:, 0] - other.u_m, near[:, 1] - other.v_m)
-            ahead = np.flatnonzero(gaps < room - 0.01)
-            if len(ahead) == 0 or (gaps[0] < room and gaps[min(3, len(gaps) - 1)] > gaps[0]):
+            ahead = np.flatnonzero(gaps < robot.profile.radius_m + other.profile.radius_m + TOUCH_M)
+            if len(ahead) == 0 or (ahead[0] == 0 and gaps[: ahead.max() + 2].min() > gaps[0] - 0.002):
                 continue  # nobody there, or it drives away from the other
             at = int(ahead[0])
             self._cap(robot, at * _SAMPLE_M)
-            if self._follows(near, at, other):
+            if self._follows(near, at, other) and t_s < self._still[other.id] + PATIENCE_S:
                 continue
             self._meet(robot, other, t_s, views)
 
@@ -240,6 +250,7 @@ class Rules:
                 return True
         if dead:
             return False
+        corridor[:, 2] += ARRIVED_M
         path = self._belief.refuge(view, bodies, corridor[::2], _REFUGE_S)
         if not path:
             return False
