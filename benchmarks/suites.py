@@ -117,11 +117,11 @@ def _smoke() -> Suite:
     ]
     rest = [
         *of_family("metric_complete", "tiny", [1], ("react_opt",)),
-        *of_family("plain", "small", [1], ("react_opt", "highs", "scipy")),
-        *of_family("conflicts", "tiny", [1], ("react_opt", "highs", "scip")),
-        *of_family("generalised", "tiny", [1], ("react_opt", "highs", "cp-sat")),
-        *of_family("inspection_floor", "small", [1], ("react_opt", *ROUTERS), limit_s=1.5),
-        *of_family("inspection_tight", "tiny", [1], ("react_opt", "highs", "scip"), limit_s=3.0),
+        *of_family("plain", "small", [1], ("react_opt", "highs", "scip", "scipy")),
+        *of_family("conflicts", "tiny", [1], ("react_opt", *MONOLITHS)),
+        *of_family("generalised", "tiny", [1], ("react_opt", *MONOLITHS)),
+        *of_family("inspection_floor", "tiny", [1], ("react_opt", "highs", "scip", *ROUTERS), limit_s=2.0),
+        *of_family("inspection_tight", "tiny", [1], ("react_opt", "highs", "scip", *ROUTERS), limit_s=2.0),
     ]
     common = {"resolution_m": 0.1, "points": 10, "seed": 0}
     paths = (
@@ -156,11 +156,12 @@ def _full() -> Suite:
     entries: list[Entry] = []
     for name, family in FAMILIES.items():
         for size in family.sizes:
-            some = ("react_opt",) if size in ("huge", "giant", "colossal") else (*ALL, *ROUTERS, "scipy")
-            entries += of_family(name, size, [1, 2, 3], some)
+            rivals = ALL if size in ("tiny", "small") else ("react_opt", *MONOLITHS, *COMMERCIAL)
+            alone = size in ("huge", "giant", "colossal")
+            entries += of_family(name, size, [1, 2, 3], ("react_opt",) if alone else (*rivals, *ROUTERS, "scipy"))
     entries += scaling([4, 6, 8, 10, 14, 20, 30, 40], [20, 40, 80, 160, 320], [1, 2, 4, 8, 16])
     paths = tuple(path_runs([10, 40, 200], [0.1, 0.05], [500, 4000, 16000]))
-    return Suite("full", "every family at every size, three seeds, five minutes per run", 300.0, tuple(entries), paths)
+    return Suite("full", "every family at every size, three seeds: a night", 120.0, tuple(entries), paths)
 
 
 def _scaling() -> Suite:
