@@ -51,6 +51,8 @@ def suite_of(what: Sequence[str], format: str | None) -> Suite:
 def bench(suite: Suite, settings: runner.Settings, results: str, reports: Sequence[str]) -> int:
     """Run what a results file does not hold yet, print the report, write it, and return the exit code.
 
+    The report is of the whole file, which several suites may share.
+
     Parameters
     ----------
     suite, settings
@@ -81,7 +83,7 @@ def bench(suite: Suite, settings: runner.Settings, results: str, reports: Sequen
             bar.update(task, advance=1, description=f"{run['peer']} {run['instance']}"[:48])
 
         records = runner.run(suite, settings, results, jobs, show, interruption.asked)
-    found = report.of_file(results, {job.key for job in jobs})
+    found = report.of_file(results)
     Console().print(report.summary(found))
     for file in reports:
         report.write(found, file)

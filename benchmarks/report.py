@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import util
 from os import PathLike
@@ -51,15 +51,13 @@ class Results:
         return [run for run in self.paths if run.get("impossible")]
 
 
-def of_file(file: str | PathLike[str], keys: Collection[str] | None = None) -> Results:
+def of_file(file: str | PathLike[str]) -> Results:
     """Return what a results file holds.
 
     Parameters
     ----------
     file
         The file (JSON lines), as ``react-opt bench`` writes it.
-    keys
-        Only runs with these keys; None for all.
 
     Raises
     ------
@@ -70,7 +68,7 @@ def of_file(file: str | PathLike[str], keys: Collection[str] | None = None) -> R
     headers = tuple(line for line in lines if line.get("kind") == "bench_results")
     if not headers:
         raise InputError.single(str(file), "", "expected results of react-opt bench, with a line of kind bench_results")
-    runs = runs_of([line for line in lines if "ending" in line and (keys is None or line["key"] in keys)])
+    runs = runs_of([line for line in lines if "ending" in line])
     return Results(
         headers,
         tuple(run for run in runs if run["what"] == "solve"),
@@ -211,30 +209,35 @@ def fields_of(runs: Sequence[dict[str, Any]]) -> list[tuple[str, list[dict[str, 
 
 
 def _provenance(found: Results) -> list[page.Block]:
-    first, last = found.headers[0], found.headers[-1]
+    first = found.headers[0]
     machine = first["machine"]
-    settings = first.get("settings", {})
-    chosen = {key: settings[key] for key in ("workers", "threads", "seed", "limit_s") if settings.get(key)}
-    options = "".join(f" --{OPTIONS.get(key, key)} {value:g}" for key, value in chosen.items())
-    command = f"react-opt bench {first['suite']}{options} --report results.md"
-    version = first["versions"].get("react_opt", "unknown")
+    commands = list(dict.fromkeys(_command(header) for header in found.headers))
     limits = sorted({f"{run['limit_s']:g}" for run in found.solves}, key=float)
-    lines: list[page.Block] = [
-        page.Text(f"Made by `{command}`, begun {first['begun']}, react_opt {version}, commit {first['commit'] or 'of a release'}."),  # noqa: E501
+    commits = list(dict.fromkeys(str(header["commit"] or "of a release") for header in found.headers))
+    return [
+        page.Text(
+            f"Made by {', then '.join(f'`{command}`' for command in commands)}; begun {first['begun']}, react_opt "
+            f"{first['versions'].get('react_opt', 'unknown')}, commit {', '.join(commits)}."
+        ),
         page.Text(
             f"Machine: {machine['processor']}, {machine['cores']} cores, {machine['memory_gb']} GB, "
             f"{machine['system']}, Python {first['versions'].get('python', 'unknown')}, load {machine['load_before']} "
-            f"before the first run, {first['workers']} runs at a time. Time limits per run: "
-            f"{', '.join(limits) or '-'} s, the same for every solver on an instance; threads and seeds too."
+            f"before the first run, {first['workers']} runs at a time. Time limits: {', '.join(limits) or '-'} s per "
+            "run, the same for every solver on an instance, as are threads and seeds."
         ),
         page.Text(
             "Every plan was replayed by the independent checker. Objectives, bounds and verdicts of solved instances "
             "repeat on another machine; times do so as ratios."
         ),
-    ]  # fmt: skip
-    if len(found.headers) > 1:
-        lines.append(page.Text(f"The run was continued {len(found.headers) - 1} times, last {last['begun']}."))
-    return lines
+    ]
+
+
+def _command(header: Mapping[str, Any]) -> str:
+    """Return the command that made a part of the results."""
+    settings = header.get("settings", {})
+    chosen = {key: settings[key] for key in ("workers", "threads", "seed", "limit_s") if settings.get(key)}
+    options = "".join(f" --{OPTIONS.get(key, key)} {value:g}" for key, value in chosen.items())
+    return f"react-opt bench {header['suite']}{options} -o results.jsonl --report results.md"
 
 
 def _exposed(exposed: Sequence[Exposure], found: Results) -> list[page.Block]:

@@ -82,7 +82,7 @@ def jobs_of(suite: Suite, settings: Settings, skipped: Callable[[str], None] = l
     suite, settings
         What to run, and how.
     skipped
-        Called once for each solver that cannot run here, with what to install.
+        Called with a line that names the solvers which are not installed here, where there are some.
 
     Raises
     ------
@@ -95,9 +95,9 @@ def jobs_of(suite: Suite, settings: Settings, skipped: Callable[[str], None] = l
             raise UsageError(f"solver: expected one of {', '.join(PEERS)}, found {name!r}")
     missing = {name: peer.missing() for name, peer in PEERS.items()}
     wanted = {name for entry in suite.entries for name in (*entry.peers, *settings.only)} & set(PEERS)
-    for name in sorted(wanted):
-        if missing[name] and (not settings.only or name in settings.only):
-            skipped(f"{name} is left out: {missing[name]}")
+    absent = sorted(name for name in wanted if missing[name] and (not settings.only or name in settings.only))
+    if absent:
+        skipped(f"not installed and left out: {', '.join(absent)} (react-opt bench --list says how to have them)")
     jobs: dict[str, Job] = {}
     for entry in suite.entries:
         kind = entry.case.get("kind") or FAMILIES[entry.case["family"]].kind
