@@ -12,12 +12,12 @@ import pytest
 
 from benchmarks import command, report, runner
 from benchmarks.families import FAMILIES
+from benchmarks.peers import PEERS, Limits, load_peers
 from benchmarks.suites import SUITES, Suite, of_family
 from benchmarks.verdicts import exposures
-from react_opt import jsonio, solve
+from react_opt import check, jsonio, solve
 from react_opt.errors import InputError, UsageError
 from react_opt.jobs_file import read_lines
-from react_opt.solvers.watch import leave_behind  # noqa: F401  (loaded before the command line asks for it)
 
 ROOT = Path(__file__).parents[2]
 LIARS = str(Path(__file__).with_name("liars.py"))
@@ -166,6 +166,21 @@ def test_the_command_line_refuses_a_bad_file_in_one_line(tmp_path: Path) -> None
     assert done.returncode == 2
     assert done.stderr.splitlines() == [f"{bad}: expected the lines n, m and tmax"]
     assert not (tmp_path / "r.jsonl").exists()
+
+
+def test_the_solver_of_the_documentation_runs(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "add_your_solver.md").read_text()
+    file = tmp_path / "my_solver.py"
+    file.write_text(text.split("```python\n", 1)[1].split("```", 1)[0])
+    assert load_peers([str(file)]) == ("mine",)
+    family = FAMILIES["inspection_floor"]
+    instance = jsonio.parse(family.make(seed=1, **family.sizes["tiny"]))
+    told: list[float | None] = []
+    plan = PEERS["mine"].solve(instance, Limits(1.0), lambda at_s, value, bound: told.append(value))
+    del PEERS["mine"]
+    assert check(instance, plan).ok
+    assert told[-1] == plan.claim.objective
+    assert plan.claim.objective > 0
 
 
 def test_suites_have_their_families_and_solvers() -> None:
