@@ -20,7 +20,7 @@ import numpy as np
 
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.instance import FleetRobot, Mission, Profile
-from react_opt.orchestrator.belief import Belief
+from react_opt.orchestrator.belief import Belief, RobotView
 from react_opt.orchestrator.strategy import Decision, Order
 from react_opt.sim.loop import Simulation
 
@@ -50,17 +50,20 @@ class Errands:
             left = self.places[robot.id]
             if robot.state == "stuck":
                 self.abandoned += 1
-            elif robot.state == "idle" and robot.target is not None:
-                if left and np.hypot(robot.x_m - left[0][0], robot.y_m - left[0][1]) < 0.6:  # there
-                    left.pop(0)
-                    if not left:
-                        self.finished_s[robot.id] = belief.t_s
+            elif left and robot.state == "idle" and robot.target is not None and near(robot, left[0]):
+                left.pop(0)
+                if not left:
+                    self.finished_s[robot.id] = belief.t_s
             if robot.state in ("idle", "stuck"):
                 if left:
                     orders.append(Order(robot.id, belief.path(robot, left[0]), f"errand {len(left)}"))
                 elif robot.target is not None:
                     orders.append(Order(robot.id))
         return Decision(orders, done=not any(self.places.values()))
+
+
+def near(robot: RobotView, place: Point) -> bool:
+    return bool(np.hypot(robot.x_m - place[0], robot.y_m - place[1]) < 0.6)
 
 
 def building(rng: np.random.Generator) -> tuple[OccupancyMap, float]:

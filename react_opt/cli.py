@@ -213,7 +213,7 @@ def check(
     plan_file: Annotated[str, typer.Argument(metavar="PLAN", help="Plan file (JSON).")],
     bound: Annotated[bool, typer.Option("--bound", help="Recompute the bound from the certificate.")] = False,
 ) -> int:
-    """Replay a plan without any solver and print each rule that it breaks.
+    """Replay a plan (or the trace of a mission) without any solver and print each rule that it breaks.
 
     Exit codes: 0 the plan is right, 1 it breaks a rule (or belongs to another instance), 2 bad input.
 
@@ -224,8 +224,11 @@ def check(
 
     if instance_file == plan_file == "-":
         raise UsageError("PLAN: standard input is the instance already")
-    instance = _instance(load(instance_file), instance_file)
+    document = load(instance_file)
     plan = load(plan_file)
+    if document.kind == "mission" and plan.kind == "trace":
+        return _check_trace(document, instance_file, plan, plan_file)
+    instance = _instance(document, instance_file)
     if not plan.kind.endswith("_plan"):
         raise InputError.single(plan_file, "kind", f"expected a plan, found {plan.kind!r}")
     certificate = check_plan(instance, plan, bound=bound)
@@ -327,6 +330,19 @@ def solvers() -> int:
 
     Console().print(solvers_table())
     return OK
+
+
+def _check_trace(mission: Any, mission_file: str, trace: Any, trace_file: str) -> int:
+    from react_opt.certify_trace import check_trace
+    from react_opt.geometry import load_map
+
+    folder = Path() if mission_file == "-" else Path(mission_file).parent
+    certificate = check_trace(mission, trace, load_map(folder / mission.map).cells)
+    for violation in certificate.violations:
+        print(f"{trace_file}: {violation}")
+    if certificate.ok:
+        print(f"{trace_file}: ok: {trace.status}, {certificate.objective:.4%} of the coverable area known")
+    return OK if certificate.ok else VIOLATED
 
 
 def _one_of(option: str, value: str, allowed: Sequence[T]) -> T:

@@ -126,7 +126,8 @@ class SimRobot:
             self.path.pop(0)
             self.limits_m_s.pop(0)
         if not self.path or self.wait_s > 0:
-            return max(0.0, self.speed_m_s - accel), 0.0, self.heading_rad, 0.0
+            speed = max(0.0, self.speed_m_s - accel)
+            return speed, 0.0, self.heading_rad, speed * dt
         goal = self.path[0]
         away = hypot(goal[0] - self.u_m, goal[1] - self.v_m)
         error = wrapped(atan2(goal[1] - self.v_m, goal[0] - self.u_m) - self.heading_rad)
@@ -137,7 +138,7 @@ class SimRobot:
             brake = sqrt(self.limits_m_s[0] ** 2 + 2 * 0.8 * self.profile.accel_m_s2 * away)
             wanted = min(cap_m_s, brake, self._turning_m_s(error))
         speed = min(max(wanted, self.speed_m_s - accel, 0.0), self.speed_m_s + accel)
-        return speed, turn / dt, wrapped(self.heading_rad + turn), min(speed * dt, away + 0.05)
+        return speed, turn / dt, wrapped(self.heading_rad + turn), speed * dt
 
     def _reached(self) -> bool:
         goal = self.path[0]

@@ -11,8 +11,9 @@ Robots tell each other where they are and where they are going. Four times a sec
    stands above all that the other meets (so priority is handed on along a queue); a robot inside a reserved passage
    before one outside; a driving one before a standing one; the earlier in the mission's order. The lower one
    (a) drives around the other, where that costs at most :data:`DETOUR_S` more, else
-   (b) pulls over: it drives to the nearest place off the other's way, backwards along its own way if need be, and goes
-   on when the other has passed, after :data:`HOLD_S` at the latest; and where there is no such place
+   (b) pulls over: it drives to the nearest place off the other's way, backwards along its own way if need be (robots
+   of lower priority that stand there make way in their turn), and goes on when the other has passed, after
+   :data:`HOLD_S` at the latest; and where there is no such place
    (c) the roles change, and the higher one makes way.
 4. **Dead robots are driven around**; where that is not possible the robot waits, gets stuck, and abandons its target.
 """
@@ -96,6 +97,8 @@ class Rules:
             robot.cap_m_s = inf
             if robot.yields_to is not None:
                 self._hold(robot, t_s, views)
+            elif not robot.path:
+                self._heir.pop(robot.id, None)
         for robot in moving:
             self._claim(robot)
         for robot in moving:
@@ -236,7 +239,7 @@ class Rules:
         self._tried[robot.id, other.id] = t_s
         view = views[robot.id]
         others = [one for one in self._robots if one is not robot]
-        bodies = np.concatenate([self._discs(np.array([(one.u_m, one.v_m)]), self._room(robot, one)) for one in others])
+        bodies = np.concatenate([self._body(robot, one) for one in others])
         way = self._ways.get(other.id, np.array([(other.u_m, other.v_m)]))
         corridor = self._discs(way, self._room(robot, other))
         if robot.order is not None and robot.order.path_m and robot.path:
@@ -252,6 +255,12 @@ class Rules:
             return False
         corridor[:, 2] += ARRIVED_M
         path = self._belief.refuge(view, bodies, corridor[::2], _REFUGE_S)
+        if not path:  # those of lower priority will make way in their turn
+            rank = self._rank(other)
+            above = [
+                self._body(robot, one) for one in others if one is other or self._rank(one) < rank or not one.alive
+            ]
+            path = self._belief.refuge(view, np.concatenate(above), corridor[::2], _REFUGE_S)
         if not path:
             return False
         self._tell(robot, other, t_s, "pulls over")
@@ -262,6 +271,10 @@ class Rules:
             self._since[robot.id] = t_s
         self._heir[robot.id] = other.id
         return True
+
+    def _body(self, robot: SimRobot, other: SimRobot) -> Points:
+        """Return the disc that a robot's centre keeps out of, because another one stands there."""
+        return self._discs(np.array([(other.u_m, other.v_m)]), self._room(robot, other))
 
     def _tell(self, robot: SimRobot, other: SimRobot, t_s: float, how: str) -> None:
         self._record.event(t_s, "yield", robot=robot.id, target=robot.target, reason=f"{how}: {other.id} comes first")

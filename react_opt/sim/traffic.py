@@ -13,6 +13,9 @@ from react_opt.kernels import kernel
 from react_opt.sim.robot import SimRobot
 from react_opt.sim.world import World, footprint_free
 
+BACK_M_S = 0.1
+"""How fast a robot that cannot turn creeps away from a wall."""
+
 
 class Traffic:
     """Moves robots tick by tick.
@@ -52,11 +55,24 @@ class Traffic:
             robot.u_m, robot.v_m, robot.heading_rad = u, v, heading
             robot.speed_m_s, robot.turning_rad_s = speed, turning
             return
-        robot.speed_m_s = 0.0 if length > 0 else speed
+        robot.speed_m_s = 0.0
         if turning != 0 and self._free(robot, robot.u_m, robot.v_m, heading):
             robot.heading_rad, robot.turning_rad_s = heading, turning
-        else:
-            robot.heading_rad, robot.turning_rad_s = before, 0.0
+            return
+        robot.heading_rad, robot.turning_rad_s = before, 0.0
+        if robot.path and clear_m < profile.radius_m + 0.05:
+            self._back_off(robot, dt, clear_m)
+
+    def _back_off(self, robot: SimRobot, dt: float, clear_m: float) -> None:
+        """Creep along the heading, back or forth, away from what keeps a robot from turning."""
+        step = BACK_M_S * dt
+        for way in (-step, step):
+            u, v = robot.u_m + way * cos(robot.heading_rad), robot.v_m + way * sin(robot.heading_rad)
+            if not self._free(robot, u, v, robot.heading_rad):
+                continue
+            if _clearance(self._world.space.clearance_m, u / self._unit, v / self._unit) > clear_m:
+                robot.u_m, robot.v_m, robot.speed_m_s = u, v, BACK_M_S
+                return
 
     def _free(self, robot: SimRobot, u: float, v: float, heading: float) -> bool:
         half_l, half_w = robot.profile.length_m / 2 / self._unit, robot.profile.width_m / 2 / self._unit
