@@ -13,6 +13,7 @@ from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes.background import beside
 from react_opt.solvers.routes.budget import Budget, OnProgress, Standing, stopping
 from react_opt.solvers.routes.certificate import certificate
+from react_opt.solvers.routes.dual_ascent import DualAscent
 from react_opt.solvers.routes.finish import Finish
 from react_opt.solvers.routes.generation import Generation
 from react_opt.solvers.routes.greedy import greedy
@@ -22,7 +23,6 @@ from react_opt.solvers.routes.pricing import RoutePricer
 from react_opt.solvers.routes.result import RoutesResult, Status, unpriced
 from react_opt.solvers.routes.routecolumn import route_column
 from react_opt.solvers.routes.search import improve
-from react_opt.solvers.routes.subgradient import DualAscent
 from react_opt.solvers.routes.tightening import Tightening
 from react_opt.solvers.routes.tree import Tree
 
@@ -118,11 +118,11 @@ class _Proof:
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
         if self.standing.done():
             return
-        ascent = DualAscent(self.generation)
-        ascent.uniform(float(self.problem.reward.max(initial=0.0)))
+        ascent = DualAscent(self.generation, self.memory, self.seed)
+        ascent.slots()
         if self.problem.n_cells > MANY_CELLS:
             self._keep_certificate()
-            ascent.volume()
+            ascent.smooth()
         self._keep_certificate()
         if self._tighten():
             self._branch()
