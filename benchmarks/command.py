@@ -102,6 +102,15 @@ def _finished(results: str, keys: set[str]) -> int:
     return sum(line.get("key") in keys for line in read_lines(results))
 
 
+def compare(other: str, mine: str) -> int:
+    """Print what differs between two results files, with times as ratios; return 1 where a solved run differs."""
+    from benchmarks.compare import compare as compare_results
+
+    found = compare_results(report.of_file(other), report.of_file(mine))
+    print(found)
+    return EXPOSED if found.differences else OK
+
+
 def export(suite: Suite, folder: str) -> int:
     """Write the instances of a suite as JSON, and their monolithic models as MPS; return how many."""
     from react_opt.models.assignment import build as build_assignment

@@ -7,7 +7,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +98,7 @@ def jobs_of(suite: Suite, settings: Settings, skipped: Callable[[str], None] = l
     absent = sorted(name for name in wanted if missing[name] and (not settings.only or name in settings.only))
     if absent:
         skipped(f"not installed and left out: {', '.join(absent)} (react-opt bench --list says how to have them)")
+    slow_start = 0.0 if settings.cluster is None else PREPARE_S  # a cluster's machines compile when they first run
     jobs: dict[str, Job] = {}
     for entry in suite.entries:
         kind = entry.case.get("kind") or FAMILIES[entry.case["family"]].kind
@@ -105,6 +106,7 @@ def jobs_of(suite: Suite, settings: Settings, skipped: Callable[[str], None] = l
         for name in names:
             if name in PEERS and kind in PEERS[name].kinds and not missing[name]:
                 job = _solving(entry, name, suite, settings)
+                job = replace(job, time_limit_s=(job.time_limit_s or 0.0) + slow_start)
                 jobs[job.key] = job
     for arguments in suite.paths if not settings.only else ():
         text = json.dumps(arguments, sort_keys=True)

@@ -28,6 +28,7 @@ def bench(
     read: Annotated[str | None, typer.Option("--read", help="Format of the files, see --list.")] = None,
     export: Annotated[str | None, typer.Option("--export", help="Write JSON and MPS to a folder, run nothing.")] = None,
     ray: Annotated[str | None, typer.Option("--ray", help="Ray cluster: local, auto or an address.")] = None,
+    compare: Annotated[str | None, typer.Option("--compare", help="Other results: what differs, time ratios.")] = None,
     show_list: Annotated[bool, typer.Option("--list", help="List suites, families, solvers and formats.")] = False,
 ) -> int:
     """Run solvers side by side on instances, check every answer, and report who solved what and who was wrong.
@@ -36,6 +37,8 @@ def bench(
     input, 130 interrupted.
 
     Example: react-opt bench smoke --report smoke.html
+
+    Example: react-opt bench standard --compare other_machine.jsonl
 
     Example: react-opt bench --read chao p4.2.a.txt p4.2.b.txt
     """
@@ -50,8 +53,11 @@ def bench(
         count = command.export(chosen, export)
         print(f"{export}: {count} instances", file=sys.stderr)
         return 0
+    file = results or f"bench_{chosen.name}.jsonl"
+    if compare is not None:
+        return command.compare(compare, file)
     settings = Settings(
         limit_s=time_limit, threads=threads, memory_mb=memory_mb, seed=seed, only=tuple(solver or ()),
         peer_files=tuple(os.path.abspath(file) for file in peer or ()), workers=workers, cluster=ray,
     )  # fmt: skip
-    return command.bench(chosen, settings, results or f"bench_{chosen.name}.jsonl", report or [])
+    return command.bench(chosen, settings, file, report or [])

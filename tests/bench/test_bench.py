@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import command, report, runner
+from benchmarks.compare import compare
 from benchmarks.families import FAMILIES
 from benchmarks.peers import PEERS, Limits, load_peers
 from benchmarks.suites import SUITES, Suite, of_family
@@ -90,6 +91,31 @@ def test_a_stopped_run_goes_on_and_gives_the_same_report(finished: Path, tmp_pat
         if run["key"] in again:
             mine = again[run["key"]]
             assert (run["status"], run["objective"], run["bound"]) == (mine["status"], mine["objective"], mine["bound"])
+
+
+def test_results_of_two_machines_are_compared(finished: Path, tmp_path: Path) -> None:
+    """The same answers in half the time, but for one value that was changed by hand."""
+    lines = [json.loads(line) for line in (finished / "results.jsonl").read_text().splitlines()]
+    for line in lines[1:]:
+        line["result"]["wall_s"] /= 2
+    other = tmp_path / "other.jsonl"
+    other.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    found = compare(report.of_file(finished / "results.jsonl"), report.of_file(other))
+    assert found.both == len(lines) - 1
+    assert found.solved >= 4
+    assert found.differences == []
+    assert found.ratio["react_opt"] == pytest.approx(0.5, rel=0.05)
+    assert command.compare(str(finished / "results.jsonl"), str(other)) == command.OK
+    changed = next(line for line in lines[1:] if line["result"]["peer"] == "highs")
+    for field in ("objective", "bound", "claimed"):
+        changed["result"][field] -= 1.0
+    other.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert command.compare(str(finished / "results.jsonl"), str(other)) == command.OK  # exposed, so no longer solved
+    for line in lines[1:]:
+        if line["result"]["case"] == changed["result"]["case"] and line["result"]["peer"] in ("react_opt", "highs"):
+            line["result"].update(objective=5.0, bound=5.0, claimed=5.0, trajectory=[], certified=None)
+    other.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert command.compare(str(finished / "results.jsonl"), str(other)) == command.EXPOSED
 
 
 def test_a_killed_run_counts_as_unsolved(tmp_path: Path) -> None:

@@ -1,0 +1,81 @@
+"""Two results files side by side: what must agree on any machine, and times as ratios."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from benchmarks import measures
+from benchmarks.report import Results
+from benchmarks.trial import agreed
+from benchmarks.verdicts import exposures
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What two results files say of the runs that both hold.
+
+    Parameters
+    ----------
+    both
+        Runs that both hold.
+    solved
+        Runs that both solved: their objectives, bounds and verdicts must agree.
+    differences
+        Those that do not, one line each.
+    ratio
+        For each solver the geometric mean of the second file's times over the first's, on runs both solved.
+    """
+
+    both: int
+    solved: int
+    differences: list[str]
+    ratio: dict[str, float]
+
+    def __str__(self) -> str:
+        lines = [f"{self.both} runs in both, {self.solved} solved in both, {len(self.differences)} differences"]
+        lines += [f"DIFFERENT  {text}" for text in self.differences]
+        lines += [f"{peer}: {ratio:.2f} times the other's time" for peer, ratio in sorted(self.ratio.items())]
+        return "\n".join(lines)
+
+
+def compare(other: Results, mine: Results) -> Comparison:
+    """Compare two results files, of the same suite on two machines or of two versions on one."""
+    theirs, ours = _by_case(other), _by_case(mine)
+    wrong = {(item.peer, item.instance) for item in (*exposures(other.solves), *exposures(mine.solves))}
+    both = [key for key in ours if key in theirs]
+    solved = [key for key in both if all(measures.is_solved(side[key], wrong) for side in (ours, theirs))]
+    differences = [text for key in both if (text := _difference(theirs[key], ours[key], key in solved))]
+    logs: dict[str, list[float]] = {}
+    for key in solved:
+        ratio = max(0.001, ours[key]["wall_s"]) / max(0.001, theirs[key]["wall_s"])
+        logs.setdefault(ours[key]["peer"], []).append(math.log(ratio))
+    return Comparison(
+        len(both), len(solved), differences, {peer: math.exp(sum(v) / len(v)) for peer, v in logs.items()}
+    )
+
+
+def _by_case(results: Results) -> dict[str, Mapping[str, Any]]:
+    return {
+        json.dumps([run["case"], run["peer"], run["gap_asked"]], sort_keys=True): run
+        for run in results.solves
+        if run["status"] != "not met"
+    }
+
+
+def _difference(one: Mapping[str, Any], other: Mapping[str, Any], solved: bool) -> str:
+    who = f"{other['peer']} on {other['instance']}"
+    if one.get("sha256", "") != other.get("sha256", "") and one.get("sha256") and other.get("sha256"):
+        return f"{who}: another instance under the same name"
+    if not solved or other["gap_asked"] > 0:
+        return ""
+    if one["status"] != other["status"]:
+        return f"{who}: {one['status']} and {other['status']}"
+    for what in ("objective", "bound"):
+        first, second = one.get(what), other.get(what)
+        if first is not None and second is not None and abs(first - second) > 2 * agreed(first, other["tolerance"]):
+            return f"{who}: {what} {first:.9g} and {second:.9g}"
+    return ""
