@@ -19,6 +19,7 @@ from benchmarks.verdicts import exposures
 from react_opt.errors import ReactError, UsageError
 from react_opt.interrupt import Interruption
 from react_opt.jobs import Record
+from react_opt.jobs_file import read_lines
 from react_opt.jsonio import require_writable, save
 
 OK, EXPOSED, INTERRUPTED = 0, 1, 130
@@ -68,15 +69,17 @@ def bench(suite: Suite, settings: runner.Settings, results: str, reports: Sequen
         report.form_of(file)
     jobs = runner.jobs_of(suite, settings, lambda text: print(text, file=sys.stderr))
     console = Console(stderr=True)
-    if settings.cluster is None:
+    finished = _finished(results)
+    left = [job for job in jobs if job.key not in finished]
+    if settings.cluster is None and left:
         with console.status("preparing compiled kernels: at their first use on a machine a minute or two"):
-            prepared = runner.prepare(jobs)
+            prepared = runner.prepare(left)
         if prepared is not None and prepared.ending != "done":
             raise ReactError(f"the solvers cannot be prepared: {prepared.error}")
     columns = (TextColumn("{task.description:48}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     quiet = not console.is_terminal
     with Interruption() as interruption, Progress(*columns, console=console, transient=True, disable=quiet) as bar:
-        task = bar.add_task(suite.name, total=len(jobs), completed=_finished(results, {job.key for job in jobs}))
+        task = bar.add_task(suite.name, total=len(jobs), completed=len(jobs) - len(left))
 
         def show(record: Record) -> None:
             run = runner.runs_of([record])[0]
@@ -94,12 +97,8 @@ def bench(suite: Suite, settings: runner.Settings, results: str, reports: Sequen
     return EXPOSED if exposures(found.solves) or found.impossible_paths else OK
 
 
-def _finished(results: str, keys: set[str]) -> int:
-    from react_opt.jobs_file import read_lines
-
-    if not Path(results).exists():
-        return 0
-    return sum(line.get("key") in keys for line in read_lines(results))
+def _finished(results: str) -> set[str]:
+    return {line["key"] for line in read_lines(results) if "key" in line} if Path(results).exists() else set()
 
 
 def compare(other: str, mine: str) -> int:

@@ -71,7 +71,8 @@ def of_files(format: str, files: Sequence[str], limit_s: float = 60.0) -> Suite:
                 raise UsageError(f"{file}: there is nothing to solve in a file of kind {instance.kind!r}")
             case = {"format": format, "file": os.path.abspath(file), "number": number, "kind": instance.kind}
             entries.append(Entry({**case, "name": instance.name}, tuple(PEERS)))
-    return Suite("files", f"{len(files)} files of format {format}", limit_s, tuple(entries))
+    how = "" if format == "json" else f"--read {format} "
+    return Suite("files", how + " ".join(Path(file).name for file in files), limit_s, tuple(entries))
 
 
 def jobs_of(suite: Suite, settings: Settings, skipped: Callable[[str], None] = lambda text: None) -> list[Job]:
@@ -152,7 +153,8 @@ def run(
     should_stop: Callable[[], bool] | None = None,
 ) -> list[Record]:
     """Run the jobs that the results file does not hold yet; see :func:`react_opt.jobs.run_jobs`."""
-    header = {**SCHEMA, "suite": suite.name, "machine": machine(), "versions": versions(), "commit": commit()}
+    what = suite.about if suite.name == "files" else suite.name
+    header = {**SCHEMA, "suite": what, "machine": machine(), "versions": versions(), "commit": commit()}
     header["workers"] = places(suite, settings)
     header["settings"] = {key: value for key, value in asdict(settings).items() if value not in (None, ())}
     return run_jobs(
