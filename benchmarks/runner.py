@@ -177,7 +177,7 @@ def machine() -> dict[str, Any]:
         name = models[0] if models else name
     return {
         "processor": name, "cores": os.cpu_count() or 1, "memory_gb": round(psutil.virtual_memory().total / 1e9, 1),
-        "system": f"{platform.system()} {platform.release()}", "load_before": round(os.getloadavg()[0], 2),
+        "system": platform.system(), "load_before": round(os.getloadavg()[0], 2),
     }  # fmt: skip
 
 
