@@ -24,11 +24,11 @@ class Control:
     work_limit
         Pricings and portions of local search at most; None for none.
     should_stop
-        Polled from a thread of its own; True stops. None for never.
+        Polled from another thread; True stops. None for never.
 
     Notes
     -----
-    A context manager: the thread lives within it. ``flag[0]`` is nonzero once the deadline has passed or the
+    A context manager: a thread watches within it. ``flag[0]`` is nonzero once the deadline has passed or the
     caller wants to stop; kernels that run without the interpreter's lock read it.
     """
 
@@ -37,31 +37,24 @@ class Control:
         self.work = 0
         self.flag = np.zeros(1, np.uint8)
         self.limit: Limit = "none"
-        self._leave = threading.Event()
-        self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Control:
         """Start to watch."""
         if self.deadline is not None or self.should_stop is not None:
-            self._thread = threading.Thread(target=self._watch, daemon=True)
-            self._thread.start()
+            _WATCH.add(self)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the watch, and whatever still runs on the flag."""
-        self._leave.set()
+        _WATCH.remove(self)
         self.flag[0] = 1
-        if self._thread is not None:
-            self._thread.join()
 
-    def _watch(self) -> None:
-        while not self.stopped():
-            left_s = np.inf if self.deadline is None else self.deadline - time.perf_counter()
-            wait_s = min(POLL_S, left_s) if self.should_stop is not None else left_s
-            if self._leave.wait(max(0.0, wait_s)):
-                return
+    def wake_at(self, now: float) -> float:
+        """``time.perf_counter()`` at which to look again."""
+        next_poll = now + POLL_S if self.should_stop is not None else np.inf
+        return float(next_poll if self.deadline is None else min(next_poll, self.deadline))
 
     def stopped(self) -> bool:
         """Whether to stop, with the reason in ``limit``."""
@@ -83,3 +76,42 @@ class Control:
     def left_s(self) -> float | None:
         """Seconds left, None for no deadline."""
         return None if self.deadline is None else max(0.0, self.deadline - time.perf_counter())
+
+
+class _Watch:
+    """One thread for all controls of the process: starting and joining one per solve costs more than a small solve."""
+
+    def __init__(self) -> None:
+        self._change = threading.Condition()
+        self._controls: list[Control] = []
+        self._wake_at = np.inf
+        self._thread: threading.Thread | None = None
+
+    def add(self, control: Control) -> None:
+        with self._change:
+            self._controls.append(control)
+            if self._thread is None or not self._thread.is_alive():  # the first, or in a forked child
+                self._wake_at = np.inf
+                self._thread = threading.Thread(target=self._run, name="react_opt watch", daemon=True)
+                self._thread.start()
+            if control.wake_at(time.perf_counter()) < self._wake_at:
+                self._change.notify()
+
+    def remove(self, control: Control) -> None:
+        with self._change:
+            if control in self._controls:
+                self._controls.remove(control)
+
+    def _run(self) -> None:
+        while True:
+            with self._change:
+                now = time.perf_counter()
+                self._wake_at = min((c.wake_at(now) for c in self._controls), default=self._wake_at)
+                self._change.wait(None if self._wake_at == np.inf else max(0.0, self._wake_at - now))
+                watched, self._wake_at = list(self._controls), np.inf
+            for control in watched:  # without the lock: what the caller wants to know is the caller's code
+                if control.stopped():
+                    self.remove(control)
+
+
+_WATCH = _Watch()
