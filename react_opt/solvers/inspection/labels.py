@@ -81,7 +81,7 @@ def completion(prize: Any, gain: Any, resource: Any, limit: float, n_buckets: in
 
 
 @kernel
-def _ahead(table: Any, first: Any, other: Any, i: int, used: float, width: float, mask: Any, label: int) -> float:
+def still_ahead(table: Any, first: Any, other: Any, i: int, used: float, width: float, mask: Any, label: int) -> float:
     """Bound from a completion table, knowing which targets are excluded."""
     b = min(int(used / width), table.shape[1] - 1)
     to = first[i, b]
@@ -205,9 +205,9 @@ def best_routes(
                 for w in range(words):
                     mask[count, w] = (mask[label, w] & memory[j, w]) | mask[0, w]
                 mask[count, j >> 6] |= one << np.uint64(j & 63)
-                if n_time > 0 and p + _ahead(t_best, t_first, t_other, j, t, t_width, mask, count) <= threshold:
+                if n_time > 0 and p + still_ahead(t_best, t_first, t_other, j, t, t_width, mask, count) <= threshold:
                     continue
-                if n_energy > 0 and p + _ahead(e_best, e_first, e_other, j, e, e_width, mask, count) <= threshold:
+                if n_energy > 0 and p + still_ahead(e_best, e_first, e_other, j, e, e_width, mask, count) <= threshold:
                     continue
                 if mode != ENUMERATE:
                     rest = p
@@ -266,9 +266,9 @@ def best_routes(
                 if mode == HEURISTIC:
                     promise[count] = p
                     if n_time > 0:
-                        promise[count] += _ahead(t_best, t_first, t_other, j, t, t_width, mask, count)
+                        promise[count] += still_ahead(t_best, t_first, t_other, j, t, t_width, mask, count)
                     elif n_energy > 0:
-                        promise[count] += _ahead(e_best, e_first, e_other, j, e, e_width, mask, count)
+                        promise[count] += still_ahead(e_best, e_first, e_other, j, e, e_width, mask, count)
                 dead[count] = False
                 parity[count] = odd
                 after[count] = head[j]

@@ -13,6 +13,7 @@ from react_opt.models.inspection import ABSENT, FloatArray, InspectionArrays, In
 from react_opt.solvers.inspection.answer import rounded
 from react_opt.solvers.inspection.labels import EXACT, HEURISTIC, MOST_BUCKETS, best_routes
 from react_opt.solvers.inspection.master import Column
+from react_opt.solvers.inspection.ngroutes import best_ng_routes
 
 ELEMENTARY_UP_TO = 40  # targets; above, routes remember a neighbourhood
 NEIGHBOURHOOD = 8
@@ -100,24 +101,38 @@ class Pricer:
         n = len(arrays.value)
         self.n, self.words = n, max(1, (n + 63) // 64)
         self.metric = bool(is_metric(self.time_s, self.energy_j))
+        self._budgets()
         self.elementary = n <= ELEMENTARY_UP_TO
         self.everything = np.tile(_bits([list(range(n))], self.words), (n, 1))
         self.memory = self.everything if self.elementary else self._neighbourhoods()
         self._room = _labels(FIRST_LABELS, self.words)
         self._values: list[float] = arrays.value.tolist()
+        self._cost: list[list[float]] = self.cost.tolist()
         buckets = (
-            _bucket_count(self.time_s, arrays.time_limit_s, n),
+            _bucket_count(self.time_s, self.time_limit, n),
             _bucket_count(self.energy_j, self.energy_limit, n),
         )
         # A budget that the other one leaves mostly unused bounds nothing: its table is not worth computing.
-        binding = _tightness(self.time_s, arrays.time_limit_s), _tightness(self.energy_j, self.energy_limit)
+        binding = _tightness(self.time_s, self.time_limit), _tightness(self.energy_j, self.energy_limit)
         self.buckets = (
             0 if binding[0] < SLACK * binding[1] and buckets[1] else buckets[0],
             0 if binding[1] < SLACK * binding[0] and buckets[0] else buckets[1],
         )
 
+    def _budgets(self) -> None:
+        """Drop a budget that the other implies: labels then compare by one budget, which beats far more of them."""
+        time_limit = self.arrays.time_limit_s
+        self.time_limit = time_limit
+        listed = (self.time_s < ABSENT) | (self.energy_j < ABSENT)
+        time_share, energy_share = self.time_s[listed] * self.energy_limit, self.energy_j[listed] * time_limit
+        if (energy_share <= time_share).all():
+            self.energy_j, self.energy_limit = np.zeros_like(self.energy_j), np.inf
+        elif (time_share <= energy_share).all():
+            self.time_s, self.time_limit = np.zeros_like(self.time_s), np.inf
+
     def _neighbourhoods(self) -> NDArray[np.uint64]:
-        near = np.argsort(self.time_s[: self.n, : self.n].T - 1e18 * np.eye(self.n), axis=1, kind="stable")
+        drives = self.arrays.time_s[self.robot, : self.n, : self.n]
+        near = np.argsort(drives.T - 1e18 * np.eye(self.n), axis=1, kind="stable")
         return _bits(near[:, :NEIGHBOURHOOD].tolist(), self.words)
 
     def price(
@@ -158,26 +173,28 @@ class Pricer:
         bound = np.zeros(1)
         while True:
             room = self._room
-            made = best_routes(
-                prize, rate, self.cost, self.time_s, self.energy_j, self.arrays.time_limit_s, self.energy_limit,
-                memory, self.metric, threshold, mode, *self.buckets, *charges, BEAM, bound, stop,
-                *room,
-            )  # fmt: skip
+            if mode == EXACT and not self.elementary:
+                made = self._ng_routes(prize, rate, threshold, stop, room)
+                bound[0] = np.inf
+            else:
+                made = best_routes(
+                    prize, rate, self.cost, self.time_s, self.energy_j, self.time_limit, self.energy_limit,
+                    memory, self.metric, threshold, mode, *self.buckets, *charges, BEAM, bound, stop,
+                    *room[:10],
+                )  # fmt: skip
             if made >= 0 or stop[0] != 0 or len(room[0]) >= most:
                 break
             self._room = _labels(min(most, 8 * len(room[0])), self.words)
-        node, parent, _, _, final, used_t, used_e = self._room[:7]
-        used = used_t if self.arrays.by_time else used_e
+        node, parent, _, _, final = self._room[:5]
         size = abs(made)
         good = np.flatnonzero(final[:size] > threshold)
         best = None
         if made > 0 and mode != HEURISTIC:
             best = float(final[good].max()) if len(good) else threshold
         order = good[np.argsort(-final[good], kind="stable")]
-        cost = (used[order] + self.cost[node[order], n + 1]).tolist()
         columns: list[Column] = []
         seen: dict[frozenset[int], int] = {}
-        for label, total in zip(order.tolist(), cost, strict=True):
+        for label in order.tolist():
             if len(columns) >= count:
                 break
             stops: list[int] = []
@@ -186,6 +203,7 @@ class Pricer:
                 stops.append(int(node[at]))
                 at = int(parent[at])
             stops.reverse()
+            total = self._total(stops)
             key = frozenset(stops) if len(set(stops)) == len(stops) else frozenset([-label])
             value = sum(self._values[k] for k in stops)
             if key not in seen:
@@ -195,20 +213,42 @@ class Pricer:
                 columns[seen[key]] = Column(self.group, tuple(stops), value, total)
         return Priced(columns, best, float(bound[0]), size)
 
+    def _ng_routes(
+        self, prize: FloatArray, rate: float, threshold: float, stop: NDArray[np.uint8], room: tuple[NDArray[Any], ...]
+    ) -> int:
+        """Fill ``room`` with the labels of ng-routes, in the order of the budget that binds."""
+        by_time = self.buckets[0] >= self.buckets[1] and self.time_limit < np.inf
+        budgets = (self.time_s, self.energy_j, self.time_limit, self.energy_limit)
+        if not by_time:
+            budgets = (self.energy_j, self.time_s, self.energy_limit, self.time_limit)
+        return int(
+            best_ng_routes(
+                prize, rate, self.cost, *budgets, self.memory, self.metric, threshold,
+                self.buckets[0 if by_time else 1], stop, *room[:8], room[10],
+            )
+        )  # fmt: skip
+
+    def _total(self, stops: list[int]) -> float:
+        """Return the second objective of a route."""
+        total, at = 0.0, self.n
+        for k in stops:
+            total += self._cost[at][k]
+            at = k
+        return total + self._cost[at][self.n + 1]
+
     def column(self, stops: tuple[int, ...]) -> Column:
         """Return a route as a column."""
-        time_s, energy_j = self.arrays.totals(self.robot, stops)
         value = float(self.arrays.value[list(stops)].sum())
-        return Column(self.group, stops, value, time_s if self.arrays.by_time else energy_j)
+        return Column(self.group, stops, value, self._total(list(stops)))
 
 
 def _labels(most: int, words: int) -> tuple[NDArray[Any], ...]:
-    """Return room for labels, in the order in which :func:`best_routes` takes it."""
+    """Return room for labels, in the order in which :func:`best_routes` takes it, and for a queue."""
     whole, real = np.int64, np.float64
     return (
         np.empty(most, whole), np.empty(most, whole), np.empty(most, real), np.empty((most, words), np.uint64),
         np.empty(most, real), np.empty(most, real), np.empty(most, real), np.empty(most, whole),
-        np.empty(most, np.bool_), np.empty(most, np.uint64),
+        np.empty(most, np.bool_), np.empty(most, np.uint64), np.empty(most, whole),
     )  # fmt: skip
 
 
@@ -242,7 +282,7 @@ def simple_bound(arrays: InspectionArrays, pricers: list[Pricer], grid: float) -
     for pricer in pricers:
         t = pricer.time_s[n, :n] + pricer.time_s[:n, n + 1]
         e = pricer.energy_j[n, :n] + pricer.energy_j[:n, n + 1]
-        within |= (t <= arrays.time_limit_s) & (e <= pricer.energy_limit) if pricer.metric else True
+        within |= (t <= pricer.time_limit) & (e <= pricer.energy_limit) if pricer.metric else True
     value = np.where(within, arrays.value, 0.0)
     best = float(value.sum())
     if not n or not len(arrays.time_s):
