@@ -33,10 +33,13 @@ MORE_PORTIONS = 3  # of local search where the first enumeration would be too la
 KNOWN_S = 0.5  # of the integer program over the routes known
 FIRST_PORTION, PORTION = 400, 2000  # iterations
 LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing limits the search
-COLUMNS = 30  # added per pricing
+COLUMNS = 120  # added per pricing, over all classes
+FAR = 0.01  # of the value: a gap that no enumeration closes where targets are many
+SMOOTHING = 0.5  # share of the best prices so far in those that are tried (Wentges 1997)
 MIP_NODES = 2000  # of an integer program under a work limit
-WARM_S, WARM_SHARE, WARM_PORTIONS = 10.0, 0.6, 8  # of local search before the first linear program
-FRESH_EVERY = 8  # portions of such a search
+WARM_SHARE, WARM_PORTIONS = 0.3, 15  # of local search before the first linear program
+FRESH_EVERY = 5  # portions of such a search
+MOST_POOLED = 6000  # columns, above which routes of local search are no longer added
 DOUBLINGS, LONG_HEAT, LONG_ROOM = 5, 1.0, 1.0  # of the portions where there are many targets
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
 
@@ -77,11 +80,13 @@ class Decomposition:
         self.elementary = len(arrays.value) <= ELEMENTARY_UP_TO
         self.master = Master(arrays, self.sizes)
         self.answer = Answer()
+        self.columns = max(30, COLUMNS // max(1, len(self.sizes)))
         self.grid = grid_of(arrays.value)
         self.searcher: Searcher | None = None
         self.beside = threads > 1 and control.work_limit is None and len(arrays.value) > SMALL
         self.notes = self.answer.notes
         self._thread: threading.Thread | None = None
+        self._fresh: Searcher | None = None
         empty: Routes = [[] for _ in arrays.time_s]
         for start in (routes, empty):
             if start is not None and arrays.is_feasible(start):
@@ -108,7 +113,10 @@ class Decomposition:
                 portions += 1
                 if self.control.deadline is None and portions > LAST_PORTIONS:
                     break
-                self._search(PORTION)
+                if self.elementary:
+                    self._search(PORTION)
+                elif not self._search_anew(WARM_PORTIONS + portions - 1):
+                    break
         self.control.flag[0] = 1
         if self._thread is not None:
             self._thread.join()
@@ -172,10 +180,10 @@ class Decomposition:
         if self.searcher is not None:
             self.offer(self.searcher.routes)
 
-    def _pool(self) -> None:
-        """Give the linear program the routes that local search has come across."""
-        if self.searcher is not None:
-            seen = sorted(self.searcher.seen.copy())
+    def _pool(self, searcher: Searcher | None) -> None:
+        """Give the linear program the routes that a local search has come across."""
+        if searcher is not None:
+            seen = sorted(searcher.seen.copy())
             self.master.add([self.pricers[self.group[r]].column(stops) for r, stops in seen])
 
     def _value_slack(self) -> float:
@@ -191,8 +199,11 @@ class Decomposition:
         bound = answer.cost_bound
         return bound is not None and bound >= answer.cost - COST_TOLERANCE * max(1.0, answer.cost)
 
-    def _bound(self, duals: Duals, best: list[float], second: bool) -> None:
-        """Lower the bound by what these prices prove; ``best`` is the largest profit per class."""
+    def _bound(self, duals: Duals, best: list[float], second: bool) -> float:
+        """Tighten the bound by what these prices prove, and return that, to be minimised.
+
+        ``best`` is the largest profit per class.
+        """
         answer = self.answer
         earned = sum(size * profit for size, profit in zip(self.sizes, best, strict=True))
         if second:
@@ -200,13 +211,14 @@ class Decomposition:
                 duals.value * (self.master.least_value or 0.0) + float(duals.target.sum() + duals.cuts.sum()) - earned
             )
             answer.cost_bound = max(bound, answer.cost_bound or 0.0)
-            return
-        bound = earned - float(duals.target.sum()) - float(duals.cuts.sum())
-        bound = rounded(bound, self.grid)
+            return bound
+        proven = earned - float(duals.target.sum()) - float(duals.cuts.sum())
+        bound = rounded(proven, self.grid)
         if bound < answer.value_bound:
             answer.value_bound = max(bound, answer.value)
             if self.on_bound is not None:
                 self.on_bound(answer.value if answer.routes is not None else None, answer.value_bound)
+        return -proven
 
     def _stage(self, second: bool) -> bool:
         """Solve one stage; True where its objective is proven."""
@@ -219,7 +231,9 @@ class Decomposition:
         if self.answer.infeasible or done():
             return True
         if duals is None:
-            return False
+            if not self.elementary and not self.control.stopped():
+                self._choose_known(second)
+            return done()
         self._search(min(PORTION, 50 * len(self.arrays.value)))
         if done() or self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
             return True
@@ -240,10 +254,12 @@ class Decomposition:
         """Price until no route improves the linear program; its duals, None where it was stopped."""
         done = self._cost_proven if second else self._value_proven
         rate = 1.0 if second else 0.0
-        if not self.elementary:
+        if not self.elementary and not second:
             self._warm_up()
             if done():
                 return None
+        centre: Duals | None = None
+        most, share = -np.inf, 0.0 if self.elementary else SMOOTHING
         while not self.control.stopped():
             duals = self.master.solve()
             if duals is None:
@@ -251,51 +267,74 @@ class Decomposition:
             self._integral(second)
             if done():
                 return None
-            prize = duals.value * self.arrays.value + duals.target
             eps = 1e-7 * max(1.0, abs(duals.objective))
-            threshold = [-float(price) + eps for price in duals.group]
-            if not self.elementary and self._price(duals, prize, rate, threshold, second):
+            used = duals.towards(centre, share)
+            prize = used.value * self.arrays.value + used.target
+            threshold = [-float(price) + eps for price in used.group]
+            if not self.elementary and self._price(used, prize, rate, threshold, second):
                 if self._thread is not None:
                     self._collect()
                 continue
-            best = self._price_exactly(prize, rate, threshold, self._cuts(duals))
+            best = self._price_exactly(prize, rate, threshold, self._cuts(used))
             if best is None:
                 return None
             if duals.stand_in < 1e-6:
-                self._bound(duals, [max(profit, t) for profit, t in zip(best[0], threshold, strict=True)], second)
-            if done():
+                profits = [max(profit, t) for profit, t in zip(best[0], threshold, strict=True)]
+                bound = self._bound(used, profits, second)
+                if bound > most:
+                    most, centre = bound, used
+            if done() or self._bound_stands(duals, second):
                 return None
-            if not best[1]:
-                if duals.stand_in > 1e-6:
-                    self.answer.infeasible = True
-                    return None
+            if best[1]:
+                share = 0.0 if self.elementary else SMOOTHING
+            elif used is not duals:
+                share = 0.0  # nothing at the smoothed prices: try those of the linear program
+            elif duals.stand_in > 1e-6:
+                self.answer.infeasible = True
+                return None
+            else:
                 return duals
         return None
 
+    def _bound_stands(self, duals: Duals, second: bool) -> bool:
+        """Whether more pricing cannot tighten the bound's last digit, and it is too far off to be met by a choice."""
+        answer = self.answer
+        if second or self.elementary or self.grid == 0.0 or answer.routes is None or duals.stand_in > 1e-6:
+            return False
+        far = answer.value_bound - answer.value > FAR * max(self.grid, abs(answer.value))
+        return far and answer.value_bound <= rounded(-duals.objective, self.grid) + self.grid / 2
+
     def _warm_up(self) -> None:
-        """Let local search run for a while, and begin with the routes that it has come across."""
-        if self._thread is None:
-            for _ in range(WARM_PORTIONS):
-                self._search(PORTION)
-        else:
-            left_s = self.control.left_s()
-            until = time.perf_counter() + (WARM_S if left_s is None else min(WARM_S, WARM_SHARE * left_s))
-            empty: Routes = [[] for _ in self.arrays.time_s]
-            fresh, turn = empty if self.arrays.is_feasible(empty) else self.answer.routes, 0
-            while fresh is not None and time.perf_counter() < until and not self.control.stopped():
-                if turn % FRESH_EVERY == 0:  # searches that begin anew, on this thread
-                    other = Searcher(self.arrays, fresh, self.seed + 1 + turn, self.control.flag)
-                self.offer(self._anneal(other, turn % FRESH_EVERY))
-                turn += 1
-            self._collect()
-        self._pool()
+        """Search anew from a few starts, since one search gets stuck, and begin with the routes that came up."""
+        left_s = self.control.left_s()
+        until = np.inf if left_s is None or self.control.work_limit is not None else WARM_SHARE * left_s
+        until += time.perf_counter()
+        for turn in range(WARM_PORTIONS):
+            if time.perf_counter() >= until or not self._search_anew(turn):
+                break
+        self._collect()
+        self._pool(self.searcher)
+
+    def _search_anew(self, turn: int) -> bool:
+        """Run a portion of a search that began from nothing, or begin another; False where it cannot."""
+        empty: Routes = [[] for _ in self.arrays.time_s]
+        begin = empty if self.arrays.is_feasible(empty) else self.answer.routes
+        if begin is None or self.control.stopped():
+            return False
+        if self._fresh is None or turn % FRESH_EVERY == 0:
+            self._fresh = Searcher(self.arrays, begin, self.seed + 1 + turn, self.control.flag)
+        self.control.work += 1
+        self.offer(self._anneal(self._fresh, turn % FRESH_EVERY))
+        if len(self.master.columns) < MOST_POOLED:
+            self._pool(self._fresh)
+        return True
 
     def _price(self, duals: Duals, prize: FloatArray, rate: float, threshold: list[float], second: bool) -> bool:
         """Price heuristically; True where routes were found. Bounds by the completion tables on the way."""
         added, bounds = 0, []
         for pricer, least in zip(self.pricers, threshold, strict=True):
             self.control.work += 1
-            found = pricer.price(prize, rate, least, HEURISTIC, HEURISTIC_LABELS, COLUMNS, self.control.flag)
+            found = pricer.price(prize, rate, least, HEURISTIC, HEURISTIC_LABELS, self.columns, self.control.flag)
             added += self.master.add(found.columns)
             bounds.append(found.bound)
         if duals.stand_in < 1e-6 and np.isfinite(bounds).all():
@@ -309,7 +348,7 @@ class Decomposition:
         best, added, whole = [], 0, True
         for pricer, least in zip(self.pricers, threshold, strict=True):
             self.control.work += 1
-            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, COLUMNS, self.control.flag, cuts)
+            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, self.columns, self.control.flag, cuts)
             added += self.master.add(found.columns)
             if found.best is None:
                 whole = False

@@ -60,6 +60,17 @@ class Duals:
     stand_in: float
     cuts: FloatArray
 
+    def towards(self, centre: Duals | None, share: float) -> Duals:
+        """Return prices that go a share of the way to others (Wentges 1997); ``stand_in`` stays."""
+        if centre is None or share == 0.0 or len(centre.cuts) != len(self.cuts):
+            return self
+        mine = 1.0 - share
+        return Duals(
+            share * centre.target + mine * self.target, share * centre.group + mine * self.group,
+            share * centre.value + mine * self.value, self.objective, self.stand_in,
+            share * centre.cuts + mine * self.cuts,
+        )  # fmt: skip
+
 
 class Master:
     """The restricted master with its columns.

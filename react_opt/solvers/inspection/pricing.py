@@ -217,14 +217,15 @@ class Pricer:
         self, prize: FloatArray, rate: float, threshold: float, stop: NDArray[np.uint8], room: tuple[NDArray[Any], ...]
     ) -> int:
         """Fill ``room`` with the labels of ng-routes, in the order of the budget that binds."""
-        by_time = self.buckets[0] >= self.buckets[1] and self.time_limit < np.inf
-        budgets = (self.time_s, self.energy_j, self.time_limit, self.energy_limit)
-        if not by_time:
-            budgets = (self.energy_j, self.time_s, self.energy_limit, self.time_limit)
+        time_first = self.buckets[0] >= self.buckets[1] and self.time_limit < np.inf
+        main, other = (self.time_s, self.energy_j) if time_first else (self.energy_j, self.time_s)
+        limits = (self.time_limit, self.energy_limit)
+        node, parent, profit, mask, final, used_main, used_other, after = room[:8]
         return int(
             best_ng_routes(
-                prize, rate, self.cost, *budgets, self.memory, self.metric, threshold,
-                self.buckets[0 if by_time else 1], stop, *room[:8], room[10],
+                prize, rate, self.cost, main, other, limits[0 if time_first else 1], limits[1 if time_first else 0],
+                self.memory, self.metric, threshold, self.buckets[0 if time_first else 1], stop, node, parent, profit,
+                mask, final, used_main, used_other, after, room[10],
             )
         )  # fmt: skip
 
@@ -264,7 +265,7 @@ def _bucket_count(resource: FloatArray, limit: float, n: int) -> int:
     """Return buckets such that every drive between targets leaves its bucket, 0 where that takes too many."""
     inner = resource[:n, :n]
     least = float(inner.min(initial=np.inf))
-    if least <= 0 or limit <= 0:
+    if least <= 0 or limit <= 0 or not np.isfinite(least) or not np.isfinite(limit):
         return 0
     count = int(np.ceil(limit / least)) + 1
     return 0 if count > MOST_BUCKETS else max(count, min(60, 4 * n))
