@@ -8,7 +8,6 @@ are enumerated, and an integer program over them is exact.
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable
 
@@ -19,9 +18,9 @@ from react_opt.solvers.inspection.answer import Answer, grid_of, rounded
 from react_opt.solvers.inspection.closing import Closing
 from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
-from react_opt.solvers.inspection.local import Searcher
 from react_opt.solvers.inspection.master import Column, Duals, Master
 from react_opt.solvers.inspection.pricing import ELEMENTARY_UP_TO, Cuts, Pricer, classes_of, simple_bound
+from react_opt.solvers.inspection.primal import PORTION, PrimalSearch
 
 VALUE_TOLERANCE = 1e-7  # relative: plans whose values agree within it are worth the same
 COST_TOLERANCE = 1e-7
@@ -31,16 +30,13 @@ FEW_LABELS, FEW_COLUMNS = 20_000, 2500  # of an enumeration that is worth trying
 MOST_CUTS = 60
 MORE_PORTIONS = 3  # of local search where the first enumeration would be too large
 KNOWN_S = 0.5  # of the integer program over the routes known
-FIRST_PORTION, PORTION = 400, 2000  # iterations
-LAST_PORTIONS = 300  # of local search where nothing proves the plan and nothing limits the search
+FIRST_PORTION = 400  # iterations of local search
 COLUMNS = 120  # added per pricing, over all classes
+LATE = 0.5  # share of the time left below which pricing is exact
 FAR = 0.01  # of the value: a gap that no enumeration closes where targets are many
 SMOOTHING = 0.5  # share of the best prices so far in those that are tried (Wentges 1997)
 MIP_NODES = 2000  # of an integer program under a work limit
-WARM_SHARE, WARM_PORTIONS = 0.3, 15  # of local search before the first linear program
-FRESH_EVERY = 5  # portions of such a search
 MOST_POOLED = 6000  # columns, above which routes of local search are no longer added
-DOUBLINGS, LONG_HEAT, LONG_ROOM = 5, 1.0, 1.0  # of the portions where there are many targets
 SMALL = 20  # targets; up to here a search beside the proof is not worth its thread
 
 
@@ -82,11 +78,10 @@ class Decomposition:
         self.answer = Answer()
         self.columns = max(30, COLUMNS // max(1, len(self.sizes)))
         self.grid = grid_of(arrays.value)
-        self.searcher: Searcher | None = None
         self.beside = threads > 1 and control.work_limit is None and len(arrays.value) > SMALL
         self.notes = self.answer.notes
-        self._thread: threading.Thread | None = None
-        self._fresh: Searcher | None = None
+        self.primal = PrimalSearch(arrays, control, self.answer, seed, not self.elementary, self.offer, self._pool)
+        self._begun = time.perf_counter()
         empty: Routes = [[] for _ in arrays.time_s]
         for start in (routes, empty):
             if start is not None and arrays.is_feasible(start):
@@ -96,10 +91,9 @@ class Decomposition:
         """Solve as far as the control lets it, the first stage alone where not ``second``; see :class:`Answer`."""
         answer = self.answer
         answer.value_bound = simple_bound(self.arrays, self.pricers, self.grid)
-        self._search(FIRST_PORTION)
+        self.primal.run(FIRST_PORTION)
         if self.beside:
-            self._thread = threading.Thread(target=self._search_on, daemon=True)
-            self._thread.start()
+            self.primal.start_beside()
         proven = self._value_proven() or self._stage(second=False)
         if proven and not answer.infeasible and answer.routes is not None:
             if self.gap == 0.0:
@@ -108,19 +102,9 @@ class Decomposition:
             if proven and second:
                 answer.cost_bound = answer.cost
         if not proven and not answer.infeasible:
-            portions = 0
-            while not self.control.stopped() and answer.routes is not None:
-                portions += 1
-                if self.control.deadline is None and portions > LAST_PORTIONS:
-                    break
-                if self.elementary:
-                    self._search(PORTION)
-                elif not self._search_anew(WARM_PORTIONS + portions - 1):
-                    break
+            self.primal.run_out()
         self.control.flag[0] = 1
-        if self._thread is not None:
-            self._thread.join()
-            self._collect()
+        self.primal.end_beside()
         self.notes.update(columns=len(self.master.columns), work=self.control.work)
         return answer
 
@@ -148,43 +132,10 @@ class Decomposition:
             waiting[column.group].append(column.stops)
         return [list(waiting[c].pop()) for c in self.group.tolist()]
 
-    def _search(self, iterations: int) -> None:
-        """Run a portion of local search here, or collect what the one beside has found."""
-        if self._thread is not None:
-            self._thread.join(0.02)
-            self._collect()
-            return
-        if self.answer.routes is None or not len(self.arrays.value):
-            return
-        if self.searcher is None:
-            self.searcher = Searcher(self.arrays, self.answer.routes, self.seed, self.control.flag)
-        self.control.work += 1
-        known = self.answer.routes
-        if known is not self.searcher.routes:
-            self.searcher.offer(known)
-        self.offer(self.searcher.run(iterations))
-
-    def _search_on(self) -> None:
-        turn = 0
-        while self.control.flag[0] == 0 and self.searcher is not None:
-            self._anneal(self.searcher, turn)
-            turn += 1
-
-    def _anneal(self, searcher: Searcher, turn: int) -> Routes:
-        """Run a portion; where targets are many they grow and cool slowly, the time left being short or long."""
-        if self.elementary:
-            return searcher.run(PORTION)
-        return searcher.run(PORTION << min(turn, DOUBLINGS), LONG_HEAT, LONG_ROOM)
-
-    def _collect(self) -> None:
-        if self.searcher is not None:
-            self.offer(self.searcher.routes)
-
-    def _pool(self, searcher: Searcher | None) -> None:
+    def _pool(self, routes: list[tuple[int, tuple[int, ...]]]) -> None:
         """Give the linear program the routes that a local search has come across."""
-        if searcher is not None:
-            seen = sorted(searcher.seen.copy())
-            self.master.add([self.pricers[self.group[r]].column(stops) for r, stops in seen])
+        if len(self.master.columns) < MOST_POOLED:
+            self.master.add([self.pricers[self.group[r]].column(stops) for r, stops in routes])
 
     def _value_slack(self) -> float:
         value = self.answer.value
@@ -234,12 +185,12 @@ class Decomposition:
             if not self.elementary and not self.control.stopped():
                 self._choose_known(second)
             return done()
-        self._search(min(PORTION, 50 * len(self.arrays.value)))
+        self.primal.run(min(PORTION, 50 * len(self.arrays.value)))
         if done() or self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
             return True
         self._choose_known(second)
         for _ in range(MORE_PORTIONS):
-            self._search(PORTION)
+            self.primal.run(PORTION)
         if done() or self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
             return True
         while self.elementary and not done() and self.master.cut(MOST_CUTS):
@@ -255,7 +206,7 @@ class Decomposition:
         done = self._cost_proven if second else self._value_proven
         rate = 1.0 if second else 0.0
         if not self.elementary and not second:
-            self._warm_up()
+            self.primal.warm_up()
             if done():
                 return None
         centre: Duals | None = None
@@ -271,9 +222,9 @@ class Decomposition:
             used = duals.towards(centre, share)
             prize = used.value * self.arrays.value + used.target
             threshold = [-float(price) + eps for price in used.group]
-            if not self.elementary and self._price(used, prize, rate, threshold, second):
-                if self._thread is not None:
-                    self._collect()
+            late = self._late()  # then a bound matters more than a perfect linear program
+            if not self.elementary and not late and self._price(used, prize, rate, threshold, second):
+                self.primal.collect()
                 continue
             best = self._price_exactly(prize, rate, threshold, self._cuts(used))
             if best is None:
@@ -296,6 +247,12 @@ class Decomposition:
                 return duals
         return None
 
+    def _late(self) -> bool:
+        left_s, deadline = self.control.left_s(), self.control.deadline
+        if left_s is None or deadline is None or self.control.work_limit is not None:
+            return False
+        return left_s < LATE * (deadline - self._begun)
+
     def _bound_stands(self, duals: Duals, second: bool) -> bool:
         """Whether more pricing cannot tighten the bound's last digit, and it is too far off to be met by a choice."""
         answer = self.answer
@@ -303,31 +260,6 @@ class Decomposition:
             return False
         far = answer.value_bound - answer.value > FAR * max(self.grid, abs(answer.value))
         return far and answer.value_bound <= rounded(-duals.objective, self.grid) + self.grid / 2
-
-    def _warm_up(self) -> None:
-        """Search anew from a few starts, since one search gets stuck, and begin with the routes that came up."""
-        left_s = self.control.left_s()
-        until = np.inf if left_s is None or self.control.work_limit is not None else WARM_SHARE * left_s
-        until += time.perf_counter()
-        for turn in range(WARM_PORTIONS):
-            if time.perf_counter() >= until or not self._search_anew(turn):
-                break
-        self._collect()
-        self._pool(self.searcher)
-
-    def _search_anew(self, turn: int) -> bool:
-        """Run a portion of a search that began from nothing, or begin another; False where it cannot."""
-        empty: Routes = [[] for _ in self.arrays.time_s]
-        begin = empty if self.arrays.is_feasible(empty) else self.answer.routes
-        if begin is None or self.control.stopped():
-            return False
-        if self._fresh is None or turn % FRESH_EVERY == 0:
-            self._fresh = Searcher(self.arrays, begin, self.seed + 1 + turn, self.control.flag)
-        self.control.work += 1
-        self.offer(self._anneal(self._fresh, turn % FRESH_EVERY))
-        if len(self.master.columns) < MOST_POOLED:
-            self._pool(self._fresh)
-        return True
 
     def _price(self, duals: Duals, prize: FloatArray, rate: float, threshold: list[float], second: bool) -> bool:
         """Price heuristically; True where routes were found. Bounds by the completion tables on the way."""

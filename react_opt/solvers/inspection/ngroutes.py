@@ -15,7 +15,7 @@ import numpy as np
 from react_opt.kernels import kernel
 from react_opt.solvers.inspection.labels import completion, still_ahead
 
-BUCKETS = 96
+BUCKETS = 160
 
 
 @kernel
