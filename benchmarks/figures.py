@@ -12,21 +12,37 @@ from numpy.typing import NDArray
 from benchmarks import measures
 from benchmarks.verdicts import by_instance, is_right, truth_of
 
-# Okabe and Ito's palette, which all common kinds of colour vision tell apart.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#7F7F7F")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 1, 2)))
+# Okabe and Ito's palette, which all common kinds of colour vision tell apart, and two more.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#7F7F7F", "#8C510A", "#999933")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
+DASHES = (
+    "-",
+    "--",
+    "-.",
+    ":",
+    (0, (5, 1)),
+    (0, (3, 1, 1, 1)),
+    (0, (1, 1)),
+    (0, (7, 2, 1, 2)),
+    (0, (9, 2)),
+    (0, (2, 2)),
+)
+KNOWN = (
+    "react_opt", "highs", "cp-sat", "scip", "cbc", "glpk", "pyvrp", "or-routing", "nearest_first", "scipy",
+)  # fmt: skip
 Run = Mapping[str, Any]
 FloatArray = NDArray[np.float64]
 
 
-def style(peers: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return colour, marker and line style of each solver: the first one, ours, always the same."""
-    order = sorted(peers, key=lambda name: (name != "react_opt", name))
+def style(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return colour, marker and line style of each solver or method; known solvers look the same in every picture."""
+    free = [k for k, name in enumerate(KNOWN) if name not in names] or list(range(len(KNOWN)))
+    others = sorted(name for name in names if name not in KNOWN)
+    place = {name: KNOWN.index(name) for name in names if name in KNOWN}
+    place |= {name: free[k % len(free)] for k, name in enumerate(others)}
     return {
-        name: {"color": COLOURS[k % 8], "marker": MARKERS[k % 8], "linestyle": DASHES[k % 8]}
-        for k, name in enumerate(order)
-    }
+        name: {"color": COLOURS[k], "marker": MARKERS[k], "linestyle": DASHES[k]} for name, k in place.items()
+    }  # fmt: skip
 
 
 def profiles(runs: Sequence[Run], wrong: set[tuple[str, str]], kind: str) -> bytes | None:
@@ -124,6 +140,8 @@ def scaling(series: Sequence[Run], wrong: set[tuple[str, str]], axis: str) -> by
             fit = measures.exponent(x, [value - base(run, field) for value, run in zip(y, measured, strict=True)])
             text = peer if fit is None else f"{peer}: exponent {fit[0]:.2f}"
             axes.plot(x, y, label=text, lw=2, ms=6, **looks[peer])
+            if fit is not None and field == "wall_s":
+                axes.plot(x, [fit[1] * size ** fit[0] for size in x], lw=1, color=looks[peer]["color"], alpha=0.6)
         if open_:
             x = [run["size"][axis] for run in open_]
             y = [run["limit_s"] for run in open_]
@@ -133,9 +151,15 @@ def scaling(series: Sequence[Run], wrong: set[tuple[str, str]], axis: str) -> by
     for axes, text in zip(pair, ("wall time to a gap of 1 %, s", "largest resident memory, MB"), strict=True):
         axes.set_xscale("log")
         axes.set_yscale("log")
+        sizes = sorted({run["size"][axis] for run in series if "size" in run})
+        axes.set_xticks(sizes, [str(size) for size in sizes])
+        axes.xaxis.set_minor_locator(plt.NullLocator())
+        axes.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
+        if axes is pair[1]:
+            axes.yaxis.set_minor_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_xlabel(f"{axis} (log scale)")
         axes.set_ylabel(f"{text} (log scale)")
-    pair[0].set_title(f"time along {axis}; hollow: unsolved, at the limit", fontsize=10)
+    pair[0].set_title(f"time along {axis}; thin: fit; hollow: unsolved, at the limit", fontsize=10)
     pair[1].set_title(f"memory along {axis}; fitted above what the libraries take", fontsize=10)
     return _finished(figure, *pair)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,7 +111,8 @@ def page(blocks: Sequence[Block], file: str) -> None:
         if isinstance(block, Heading):
             parts.append(f"<h{block.level}>{html.escape(block.text)}</h{block.level}>")
         elif isinstance(block, Text):
-            parts.append(f"<p>{html.escape(block.text)}</p>")
+            marked = re.sub("`([^`]*)`", "<code>\\g<1></code>", html.escape(block.text))
+            parts.append(f"<p>{marked}</p>")
         elif isinstance(block, Table):
             parts.append(_html_table(block))
         else:

@@ -133,7 +133,7 @@ def blocks(found: Results) -> list[page.Block]:
         parts.append(page.Text("The figures are left out: they need matplotlib (pip install 'react_opt[plot]')."))
     for kind in kinds_of(found.compared):
         runs = [run for run in found.compared if kind_of(run) == kind]
-        parts.append(page.Heading(f"{kind}: {len(by_instance(runs))} instances"))
+        parts.append(page.Heading(f"{kind}: {counted(len(by_instance(runs)), 'instance')}"))
         parts.append(page.Text(STANDINGS))
         for number, (name, field) in enumerate(fields_of(runs), start=1):
             headings, rows = _standings(field, exposed)
@@ -204,7 +204,7 @@ def fields_of(runs: Sequence[dict[str, Any]]) -> list[tuple[str, list[dict[str, 
     for (kind, _), field in fields.items():
         count = len(by_instance(field))
         families = dict.fromkeys(str(run["case"].get("family", "files")) for run in field)
-        found.append((f"{count} {kind} instance{'s' * (count > 1)} of {', '.join(families)}", field))
+        found.append((f"{counted(count, f'{kind} instance')} of {', '.join(families)}", field))
     return found
 
 
@@ -261,6 +261,11 @@ def _scaling(found: Results, wrong: set[tuple[str, str]], drawn: bool) -> list[p
             text = f"Time to a certified gap of 1 % and memory along {axis}, with fitted exponents."
             parts.append(page.Figure(f"scaling_{axis}", png, text))
     return parts
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number of things."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def kind_of(run: Mapping[str, Any]) -> str:
