@@ -1,20 +1,14 @@
-"""Every Python snippet of the README runs as written."""
+"""Every command and every Python snippet of the README runs as written."""
 
-import os
-from pathlib import Path
+from snippets import ROOT, blocks, run_page
 
-import pytest
-
-ROOT = Path(__file__).resolve().parent.parent
-SNIPPETS = [part.split("```", 1)[0] for part in (ROOT / "README.md").read_text().split("```python\n")[1:]]
+README = ROOT / "README.md"
 
 
-@pytest.mark.parametrize("number", range(len(SNIPPETS)))
-def test_snippet_runs(number, tmp_path, monkeypatch):
-    os.symlink(ROOT / "examples", tmp_path / "examples")
-    monkeypatch.chdir(tmp_path)
-    exec(compile(SNIPPETS[number], f"README snippet {number}", "exec"), {})
+def test_the_readme_runs(tmp_path, monkeypatch, capsys):
+    run_page(README, tmp_path, monkeypatch, capsys)
 
 
 def test_there_are_snippets():
-    assert len(SNIPPETS) == 2
+    assert [language for language, _ in blocks(README)].count("python") == 2
+    assert [language for language, _ in blocks(README)].count("console") >= 2

@@ -1,4 +1,4 @@
-"""Assignment of local targets: who takes which target now (generalised assignment with conflicts).
+"""Assignment of local targets: who takes which target now (generalised assignment with conflicts)::
 
     max   sum_rk value_rk x_rk,       value_rk = gain_k - alpha time_rk / time_ref - beta energy_rk / battery_r
     s.t.  sum_r x_rk <= 1                        one robot per target

@@ -1,6 +1,6 @@
 """Deferred-priority inspection: team orienteering with a time and an energy budget.
 
-Nodes of robot r: targets 0..N-1, its start N, its end N+1. ``x[r,i,j]`` in {0,1}: robot r drives from i to j.
+Nodes of robot r: targets 0..N-1, its start N, its end N+1. ``x[r,i,j]`` in {0,1}: robot r drives from i to j::
 
     max   sum_r,i,j value_j x[r,i,j]           then, among those,   min sum_r,i,j cost_rij x[r,i,j]
     s.t.  sum_j x[r,N,j] = 1,  sum_i x[r,i,N+1] = 1                    one route per robot
