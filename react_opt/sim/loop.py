@@ -20,6 +20,7 @@ from react_opt.orchestrator.belief import RobotView
 from react_opt.orchestrator.fleet_belief import FleetBelief
 from react_opt.orchestrator.registry import make_strategy
 from react_opt.orchestrator.strategy import Decision, Order, Strategy, StrategyOptions
+from react_opt.sim.link import Channel
 from react_opt.sim.record import Recorder
 from react_opt.sim.robot import SimRobot
 from react_opt.sim.rules import Rules
@@ -90,7 +91,8 @@ class Simulation:
         self.traffic = Traffic(self.world, self.robots, mission.blocking)
         self.record = Recorder(mission, self.world, SCAN_S)
         self.rules = Rules(self.world, self.robots, self.belief, self.record) if mission.blocking else None
-        self._fleet_map = self.lidars.blank()
+        self.channel = Channel(mission.link, self.world, self.robots)
+        self._late: dict[str, Order] = {}
         self._deaths = {failure.robot: failure.t_s for failure in mission.failures}
         self._ticks = 0
         self._news = True
@@ -165,29 +167,37 @@ class Simulation:
     def _sense(self) -> None:
         """Switch sensors and scan."""
         for robot in self.robots:
-            on = robot.alive and self.lidars.wanted(robot, self._fleet_map, self.belief)
+            known = self.channel.known(robot)
+            on = robot.alive and self.lidars.wanted(robot, known, self.belief)
             if on != robot.sensing and robot.alive:
                 self.record.event(self.t_s, "sensing_on" if on else "sensing_off", robot=robot.id)
             robot.sensing = on
             self.record.track(robot, on)
             if on:
-                pixels = self.lidars.scan(robot, self._fleet_map)
-                self._deliver(pixels)
-
-    def _deliver(self, pixels: np.ndarray) -> None:
-        rows, cols = np.divmod(pixels, self._fleet_map.shape[1])
-        self.belief.merge(self.t_s, rows, cols, self._fleet_map[rows, cols])
-        self.record.learn(self.t_s, pixels)
+                self.channel.send(robot, self.lidars.scan(robot, known))
+        arrived, turned = self.channel.advance(self.robots, self.t_s, SCAN_S)
+        for pixels in arrived:
+            rows, cols = np.divmod(pixels, self.world.map.cols)
+            self.belief.merge(self.t_s, rows, cols, self.world.map.cells[rows, cols])
+            self.record.learn(self.t_s, pixels)
+        for name, up in turned:
+            self.record.event(self.t_s, "link_up" if up else "link_down", robot=name)
+            self._news = self._news or up
+            if up and name in self._late:
+                self._give(self._by_id[name], self._late.pop(name))
 
     def _due(self) -> bool:
         """Whether the strategy is to decide now."""
         last_s, version = self._decided
+        if self.belief.version == 0:
+            return False  # no map has arrived yet
         return self._news or (self.t_s >= last_s + DECIDE_S and version != self.belief.version)
 
     def _decide(self) -> None:
         """Report the robots to the belief, ask the strategy and hand out its orders."""
         for robot in self.robots:
-            self.belief.report(self._view(robot))
+            if self.channel.linked(robot) or not self._ticks:
+                self.belief.report(self._view(robot))
         _ = self.belief.areas  # the switching rules go by what the areas were at the last decision
         begun = time.perf_counter()
         decision = self.strategy.decide(self.belief)
@@ -201,8 +211,10 @@ class Simulation:
             self.record.note(self.t_s, note)
         for order in decision.orders:
             robot = self._by_id[order.robot]
-            if robot.alive:
+            if robot.alive and self.channel.linked(robot):
                 self._give(robot, order)
+            else:
+                self._late[robot.id] = order  # it arrives with the link
 
     def _give(self, robot: SimRobot, order: Order) -> None:
         """Let a robot take an order."""
@@ -252,7 +264,9 @@ class Simulation:
                 self._abandon(robot)
             if robot.state == "driving" and not robot.path and robot.yields_to is None:
                 robot.state = "idle"
-                self._news = True
+                self._news = self._news or self.channel.linked(robot)
+            if robot.state != "driving" and not self.channel.linked(robot) and not robot.path:
+                robot.follow(self.channel.crumbs(robot))  # back to where it was heard
 
     def _abandon(self, robot: SimRobot) -> None:
         self.record.event(self.t_s, "robot_stuck", robot=robot.id, target=robot.target)
@@ -280,7 +294,11 @@ class Simulation:
     def _over(self) -> bool:
         alive = [robot for robot in self.robots if robot.alive]
         standing = all(not robot.path and robot.speed_m_s == 0.0 for robot in alive)
-        return self.t_s >= self.mission.horizon_s or not alive or (self._done and standing and not self._news)
+        return (
+            self.t_s >= self.mission.horizon_s
+            or not alive
+            or (self._done and standing and not self._news and not self.channel.busy)
+        )
 
     def _end(self) -> None:
         why = "horizon" if self.t_s >= self.mission.horizon_s else "done" if self._done else "no robot left"

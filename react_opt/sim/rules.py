@@ -14,7 +14,7 @@ Robots tell each other where they are and where they are going. Four times a sec
    (b) pulls over: it drives to the nearest place off the other's way, backwards along its own way if need be (robots
    of lower priority that stand there make way in their turn), and goes on when the other has passed, after
    :data:`HOLD_S` at the latest; and where there is no such place
-   (c) the roles change, and the higher one makes way.
+   (c) the roles change, and the higher one makes way (a robot that stands in a dead end first comes out of it).
 4. **Dead robots are driven around**; where that is not possible the robot waits, gets stuck, and abandons its target.
 """
 
@@ -71,6 +71,7 @@ class Rules:
         self._record = record
         self._by_id = {robot.id: robot for robot in robots}
         self._place = {robot.id: n for n, robot in enumerate(robots)}
+        self._first: set[str] = set()
         self._still = dict.fromkeys(self._by_id, 0.0)
         self._claims: dict[str, tuple[Points, Point]] = {}
         self._since: dict[str, float] = {}
@@ -99,6 +100,8 @@ class Rules:
                 self._hold(robot, t_s, views)
             elif not robot.path:
                 self._heir.pop(robot.id, None)
+            if not robot.path:
+                self._first.discard(robot.id)
         for robot in moving:
             self._claim(robot)
         for robot in moving:
@@ -208,6 +211,8 @@ class Rules:
 
     def _rank(self, robot: SimRobot) -> tuple[int, ...]:
         """Return a robot's priority; smaller goes first. One that makes way ranks just below whom it makes way for."""
+        if robot.id in self._first:
+            return (-1, self._place[robot.id])
         own = self._own_rank(robot)
         above = self._heir.get(robot.id)
         return own if above is None else min(own, (*self._own_rank(self._by_id[above]), 1))
@@ -227,8 +232,26 @@ class Rules:
         first, second = (robot, other) if self._rank(robot) <= self._rank(other) else (other, robot)
         if second.yields_to == first.id or first.yields_to == second.id:
             return  # it is on its way
-        if not self._try(second, first, t_s, views):
+        if self._try(second, first, t_s, views):
+            return
+        if second.path or self._comes_out(second, first, t_s, views):
             self._try(first, second, t_s, views)
+
+    def _comes_out(self, robot: SimRobot, other: SimRobot, t_s: float, views: dict[str, RobotView]) -> bool:
+        """Let a robot that stands in a dead end drive out of it, past all that will make way; tell whether it can."""
+        if robot.order is not None and robot.path:
+            return False
+        dead = [self._body(robot, one) for one in self._robots if not one.alive]
+        bodies = np.concatenate(dead) if dead else np.empty((0, 3))
+        way = self._discs(self._ways[other.id], self._room(robot, other) + ARRIVED_M)
+        path = self._belief.refuge(views[robot.id], bodies, way[::2], _REFUGE_S)
+        if not path:
+            return False
+        self._tell(robot, other, t_s, "comes out")
+        robot.follow(self._grid(path))
+        self._ways[robot.id] = self._way(robot)
+        self._first.add(robot.id)
+        return True
 
     def _try(
         self, robot: SimRobot, other: SimRobot, t_s: float, views: dict[str, RobotView], dead: bool = False

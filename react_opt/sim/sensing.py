@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from react_opt.geometry.occupancy import UNKNOWN
 from react_opt.geometry.raycast import ray_table, scan_px, unknown_ahead_px
 from react_opt.instance import Mission
 from react_opt.orchestrator.fleet_belief import FleetBelief
@@ -33,10 +32,6 @@ class Lidars:
         self._found = np.empty(world.blocked.size, dtype=np.int64)
         self._marks = np.zeros(world.blocked.shape, dtype=np.int32)
         self._mark = 0
-
-    def blank(self) -> NDArray[np.uint8]:
-        """Return a map of the world's shape on which nothing is known."""
-        return np.full(self._world.blocked.shape, UNKNOWN, dtype=np.uint8)
 
     def wanted(self, robot: SimRobot, known: NDArray[np.uint8], belief: FleetBelief) -> bool:
         """Tell whether a robot's sensors are to be on, by the mission's rule, from what the robot knows alone.
