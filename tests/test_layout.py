@@ -27,6 +27,7 @@ LAYERS = [
     {"planner"},
     {"orchestrator"},
     {"sim"},
+    {"limits"},
     {"report"},
     {"cli_bench"},
     {"cli", "__main__"},

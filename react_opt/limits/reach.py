@@ -117,10 +117,10 @@ def _most(reached: FloatArray, r: int, c: int, ar: int, ac: int, step: float) ->
     """Return the largest value at a tile's corner (ar, ac) by the upwind rule of fast marching, given two others."""
     br, bc = 2 * r + 1 - ar, 2 * c + 1 - ac  # the opposite corner
     along, up = reached[ar, bc], reached[br, ac]
-    most = min(along, up) + step
+    most = float(min(along, up) + step)
     if np.isfinite(along) and np.isfinite(up) and abs(along - up) < step:
         most = min(most, (along + up + sqrt(2 * step * step - (along - up) ** 2)) / 2)
-    return most
+    return float(most)
 
 
 @kernel

@@ -28,9 +28,7 @@ def memory() -> Memory:
 
 
 @kernel
-def tiles_in_sight(
-    opaque: NDArray[np.uint8], row: int, col: int, reach: float, work: Memory, found: IntArray
-) -> int:
+def tiles_in_sight(opaque: NDArray[np.uint8], row: int, col: int, reach: float, work: Memory, found: IntArray) -> int:
     """List the tiles that see a tile.
 
     Parameters

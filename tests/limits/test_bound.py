@@ -1,0 +1,105 @@
+"""Bounds hold against the best of all plans on small maps, and count what must be visited."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+
+import numpy as np
+import pytest
+
+from react_opt.energy import RobotProfile
+from react_opt.geometry.occupancy import OccupancyMap
+from react_opt.geometry.raycast import ray_table, scan_px
+from react_opt.limits.bound import candidates, time_bound
+from react_opt.limits.hidden import survey
+from react_opt.sim.world import World
+
+# Letters of one metre, three pixels each; robots drive 1 m/s, turn and gather speed at once.
+ROBOT = RobotProfile(0.2, 0.2, 1.0, 1.0, 0.2, 1e6, 1e6, 1.0, 1.0, 1.0, 1.0, 1e6, 1e6, 0.0, 6.0, 360)
+
+COMB = """
+#################
+#.#.....#.....#.#
+#.#.###.#.###.#.#
+#.#.###.#.###.#.#
+#...###...###...#
+#################
+"""
+CROSS = """
+###########
+####.#..###
+####.##.###
+#........##
+#.##.##..##
+#.##.#.#.##
+###########
+"""
+
+
+def world_of(drawing: str, starts: list[tuple[float, float]]) -> World:
+    rows = np.array([[0 if letter == "." else 1 for letter in line] for line in drawing.split()][::-1], dtype=np.uint8)
+    return World(OccupancyMap(np.kron(rows, np.ones((3, 3), np.uint8)), 1 / 3), ROBOT.radius_m, 6.0, np.array(starts))
+
+
+def best_time(world: World, starts: list[tuple[float, float]], share: float) -> float:
+    """The least time in which robots that drive from letter to letter see a share: all ways of all robots are tried."""
+    cells, cover = world.map.cells, world.coverable.ravel()
+    free = [(x, y) for y in range(cells.shape[0] // 3) for x in range(cells.shape[1] // 3) if not cells[3 * y, 3 * x]]
+    sees = {}
+    for x, y in free:
+        known, fresh = np.full(cells.shape, 2, dtype=np.uint8), np.empty(cells.size, dtype=np.int64)
+        scan_px(cells, known, 3 * x + 1.5, 3 * y + 1.5, 1.0, 0.0, ray_table(720), 18.0, fresh)
+        sees[x, y] = frozenset(np.flatnonzero((known != 2).ravel() & cover).tolist())
+    needed = int(np.ceil(share * cover.sum() - 1e-9))
+    near = {(x, y): [k for k in ((x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)) if k in sees] for x, y in free}
+    homes = tuple((int(x), int(y)) for x, y in starts)
+    queue = [(0, 0, homes, frozenset().union(*(sees[k] for k in homes)))]
+    done, order = set(), itertools.count(1)
+    while queue:  # all robots move one letter, or wait, per second
+        time, _, places, seen = heapq.heappop(queue)
+        if len(seen) >= needed:
+            return float(time)
+        if (places, seen) in done:
+            continue
+        done.add((places, seen))
+        for step in itertools.product(*([*near[k], k] for k in places)):
+            heapq.heappush(queue, (time + 1, next(order), step, seen.union(*(sees[k] for k in step))))
+    return np.inf
+
+
+@pytest.mark.parametrize("share", [0.8, 0.95])
+@pytest.mark.parametrize(
+    ("drawing", "starts"),
+    [(COMB, [(9.5, 1.5)]), (CROSS, [(4.5, 3.5)]), (CROSS, [(4.5, 3.5), (3.5, 3.5)])],
+    ids=["comb", "cross", "cross of two"],
+)
+def test_no_plan_is_faster(drawing: str, starts: list[tuple[float, float]], share: float) -> None:
+    world = world_of(drawing, starts)
+    hidden = survey(world, [ROBOT] * len(starts), np.array(starts))
+    bound = time_bound(hidden, candidates(hidden), share, len(starts))
+    assert bound.reachability_s <= bound.time_s <= best_time(world, starts, share)
+
+
+def test_the_dead_ends_of_a_comb_must_be_visited() -> None:
+    """One robot must enter dead ends on both sides of its start; reachability counts the way to one of them alone."""
+    starts = [(9.5, 1.5)]
+    world = world_of(COMB, starts)
+    hidden = survey(world, [ROBOT], np.array(starts))
+    bound = time_bound(hidden, candidates(hidden), 0.97, 1)
+    assert bound.time_s > 2 * bound.reachability_s
+
+
+def test_a_second_robot_halves_the_work_and_the_bound_knows() -> None:
+    starts = [(9.5, 1.5), (8.5, 1.5)]
+    world = world_of(COMB, starts)
+    hidden = survey(world, [ROBOT] * 2, np.array(starts))
+    regions = candidates(hidden)
+    one, two = (time_bound(hidden, regions, 0.97, robots).time_s for robots in (1, 2))
+    assert two < one
+
+
+def test_nothing_needed_takes_no_time() -> None:
+    world = world_of(CROSS, [(4.5, 3.5)])
+    hidden = survey(world, [ROBOT], np.array([(4.5, 3.5)]))
+    assert time_bound(hidden, candidates(hidden), 1e-9, 1).time_s <= 0.01
