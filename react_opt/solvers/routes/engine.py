@@ -27,9 +27,9 @@ from react_opt.solvers.routes.tightening import Tightening
 from react_opt.solvers.routes.tree import Tree
 
 FIRST_MEMORY = 8
-EASY_ROUTES = 3_000
 MANY_CELLS = 150
 PRIMAL_SHARE = 0.05
+WORTH_IT, PATIENCE = 0.05, 2  # share of the gap that tightening has to close, and how often it may fail to
 FIRST_SEARCH_S = 0.004  # per cell
 FIRST_SEARCH_WORK = 20
 
@@ -131,24 +131,25 @@ class _Proof:
 
     def _tighten(self) -> bool:
         """Tighten the linear programme of the whole problem as long as it pays; return whether to branch then."""
-        standing, tightening = self.standing, self.tightening
+        standing, stalled, before = self.standing, 0, np.inf
         while not standing.done():
             self._forget_columns()
             solved = self.generation.converge(at_root=True)
             self._keep_certificate()
             if standing.done() or not solved:
                 return False
-            if tightening.add_limits():
-                continue
-            if self._nearly() and self._enumerated(EASY_ROUTES):
-                return False
-            if tightening.grow_memory():
+            if self.tightening.add_limits():
                 continue
             self._improve()
-            if standing.done() or self._enumerated(EASY_ROUTES):
+            assert self.generation.best is not None
+            bound = self.generation.best.bound
+            if standing.done():
                 return False
-            if not tightening.cut():
+            gap = np.inf if standing.objective is None else bound - standing.objective
+            stalled = 0 if before - bound > WORTH_IT * gap else stalled + 1
+            if self.tightening.heavy() or stalled == PATIENCE or not self.tightening.tighten(cut=stalled > 0):
                 return True
+            before = bound
         return False
 
     def _branch(self) -> None:
@@ -156,25 +157,10 @@ class _Proof:
         assert self.generation.best is not None
         tree = Tree(self.generation, self.tightening, self.finish, self.standing, self.generation.best, self._between)
         tree.run()
-        self.notes.append(f"bound from a tree of {tree.parts} parts")
+        self.notes += tree.notes()
 
     def _between(self) -> None:
         """What is done between two parts of the tree."""
-
-    def _enumerated(self, most: int) -> bool:
-        """Finish the whole problem by enumeration; return whether it was possible."""
-        best = self.generation.best
-        if best is None:
-            return False
-        bound = self.finish.bound(best, most)
-        if bound is None:
-            return False
-        self.standing.lower_bound_to(bound)
-        self.notes.append(
-            f"bound from the enumeration of {self.finish.routes} routes below the Lagrangian bound {best.bound:.9g}, "
-            "solved as a MILP"
-        )
-        return True
 
     def result(self) -> RoutesResult:
         """Return what is known."""
@@ -211,13 +197,6 @@ class _Proof:
         )
         floor = objective - best.bound - 1e-6 * max(1.0, abs(objective))
         self.master.drop(lambda column: reduced[id(column)] < floor)
-
-    def _nearly(self) -> bool:
-        """Return whether only ties are left open: the gap is a small part of the least that a cell earns."""
-        standing = self.standing
-        if standing.objective is None or standing.bound is None:
-            return False
-        return standing.bound - standing.objective <= max(0.1 * standing.lattice.reward_unit, 1e-6 * standing.objective)
 
     def _improve(self) -> None:
         """Look for better plans: the linear programme's own, if it is whole, then a short primal search."""

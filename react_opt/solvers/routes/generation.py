@@ -9,7 +9,6 @@ is above every plan (Lagrangian relaxation). Prices are smoothed towards those o
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,9 +21,10 @@ from react_opt.solvers.routes.pricing import RoutePricer, SidePrices
 from react_opt.solvers.routes.region import Region
 from react_opt.solvers.routes.rows import side_prices
 
-SMOOTHING = 0.6
-BEAM = 4
+SMOOTHING = 0.8
+BEAM = 2
 COLUMNS = 8
+MOST_COLUMNS = 15  # per row of the master; then half of them are dropped
 TAKEN = 1e9
 
 
@@ -66,7 +66,6 @@ class Generation:
         self.best: Multipliers | None = None
         self.point: MasterPoint | None = None
         self.side = SidePrices()
-        self._exact_s = self._beam_s = 0.0
 
     def look_at(self, region: Region) -> None:
         """Look at the plans of a region from now on."""
@@ -92,6 +91,12 @@ class Generation:
             if point is None:
                 return False
             self.point = point
+            if len(self.master.columns) > MOST_COLUMNS * (len(self.master.cuts) + self.master.n_cells):
+                self.master.keep_best(point, len(self.master.columns) // 2)
+                point = self.master.solve(self.standing.budget.left_s())
+                if point is None:
+                    return False
+                self.point = point
             duals = point.duals if centre is None else _between(point.duals, centre, smoothing)
             columns, priced = self._price(duals)
             if priced.best is not None:
@@ -150,26 +155,11 @@ class Generation:
         return replace(known.duals, cell=np.where(must, cell, np.maximum(cell, 0.0)), cut=cut, row=row)
 
     def _price(self, duals: Duals) -> tuple[list[Column], Priced]:
-        """Return columns from a beam and its complements, and the exact pricing that bounds them."""
-        began = time.perf_counter()
+        """Return columns and the exact pricing that found the first of them; the others complement these."""
         side = side_prices(self.side, self.master.rows, duals.row, self.pricer.problem)
-        lowest = np.full(len(self.counts), -TAKEN)
-        columns: list[Column] = []
-        floor = np.full(len(self.counts), -TAKEN)
-        for group in range(len(self.counts)):
-            beam = self.pricer.price(
-                duals, side, self.master.cuts, width=BEAM, columns=COLUMNS, groups=[group], floor=lowest
-            )
-            columns += beam.columns
-            if beam.columns:
-                floor[group] = beam.top[group] + 1e-9 * max(1.0, abs(beam.top[group]))
-        columns += self._complements(duals, side, columns)
+        exact = self.pricer.price(duals, side, self.master.cuts, columns=COLUMNS)
         self.standing.budget.spend()
-        middle = time.perf_counter()
-        exact = self.pricer.price(duals, side, self.master.cuts, columns=COLUMNS, floor=floor)
-        self.standing.budget.spend()
-        self._beam_s, self._exact_s = middle - began, time.perf_counter() - middle
-        return columns + exact.columns, exact
+        return exact.columns + self._complements(duals, side, exact.columns), exact
 
     def _complements(self, duals: Duals, side: SidePrices, columns: list[Column]) -> list[Column]:
         """Return columns that avoid each other's cells: together a plan at the given prices."""
@@ -183,6 +173,7 @@ class Generation:
         cell = duals.cell.copy()
         cell[list(chosen[0].cells)] = TAKEN
         found: list[Column] = []
+        self.standing.budget.spend()
         for group in np.repeat(np.arange(len(self.counts)), self.master.counts):
             if group == first:
                 first = -1

@@ -29,6 +29,7 @@ _ZERO = np.uint64(0)
 _ONE = np.uint64(1)
 _FACTOR = np.uint64(0x03F79D71B4CB0A89)
 _SHIFT = np.uint64(58)
+INSERTED = 40  # values that are sorted by insertion at most
 
 
 @kernel(inline="always")
@@ -36,6 +37,26 @@ def lowest_bit(word: np.uint64) -> int:
     """Return the position of the lowest bit of a word that is not zero."""
     low = word & (~word + _ONE)
     return int(_DEBRUIJN[(low * _FACTOR) >> _SHIFT])
+
+
+@kernel(inline="always")
+def sort_falling(value: FloatArray, count: int, order: IntArray) -> None:
+    """Write the indices of the first ``count`` values into ``order``, the largest first.
+
+    Most lists are short, where inserting is several times faster than a general sort and allocates nothing.
+    """
+    if count > INSERTED:
+        falling = np.argsort(-value[:count])
+        for k in range(count):
+            order[k] = falling[k]
+        return
+    for k in range(count):
+        v = value[k]
+        place = k
+        while place > 0 and value[order[place - 1]] < v:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = k
 
 
 @kernel(nogil=True)
@@ -183,6 +204,7 @@ def grow_labels(
     c_arc = np.empty(room, np.int64)
     c_sensed = np.empty(room, np.bool_)
     buy_back = np.empty(64)
+    order = np.empty(room, np.int64)
     count = 0
     for tau in range(last + 1):
         for j in range(n):
@@ -276,7 +298,9 @@ def grow_labels(
                         found += 1
             if found == 0:
                 continue
-            order = np.argsort(-c_value[:found]) if found > 1 else np.zeros(1, np.int64)
+            if found > len(order):
+                order = np.empty(2 * found, np.int64)
+            sort_falling(c_value, found, order)
             known = _ZERO
             while count + found > size:
                 size *= 2
@@ -289,7 +313,8 @@ def grow_labels(
                 arc = np.concatenate((arc, np.empty(size - len(arc), np.int64)))
                 sensed = np.concatenate((sensed, np.empty(size - len(sensed), np.bool_)))
             begin = count
-            for c in order:
+            for rank in range(found):
+                c = order[rank]
                 v, m, s, f = c_value[c], c_memory[c], c_cuts[c], c_burnt[c]
                 dominated = False
                 for k in range(begin, count):

@@ -37,12 +37,15 @@ class MasterPoint:
         Multipliers, clipped to their sign.
     lacking
         How much of the robots and of the cells to collect could not be given a column.
+    reduced
+        ``(n_columns,)`` value minus prices of each column.
     """
 
     value: float
     use: FloatArray
     duals: Duals
     lacking: float
+    reduced: FloatArray
 
 
 class Master:
@@ -144,7 +147,22 @@ class Master:
 
     def drop(self, unwanted: Callable[[Column], bool]) -> None:
         """Remove all columns that a test picks out."""
-        gone = [k for k, column in enumerate(self.columns) if unwanted(column)]
+        self._drop([k for k, column in enumerate(self.columns) if unwanted(column)])
+
+    def keep_best(self, point: MasterPoint, most: int) -> None:
+        """Remove the columns of least reduced value, so that so many are left; those in use stay.
+
+        Parameters
+        ----------
+        point
+            The optimum of the columns held.
+        most
+            How many stay.
+        """
+        order = np.argsort(np.where(point.use > 0.0, np.inf, point.reduced), kind="stable")
+        self._drop(sorted(order[: max(0, len(order) - most)].tolist()))
+
+    def _drop(self, gone: Sequence[int]) -> None:
         if not gone:
             return
         index = np.array(gone, dtype=np.int32) + self._extra
@@ -236,7 +254,8 @@ class Master:
             np.maximum(price[self._side_rows], 0.0) if self._side_rows else np.zeros(0),
         )
         value = -float(self._lp.getInfo().objective_function_value)
-        return MasterPoint(value, use[self._extra :], duals, float(use[: self._extra].sum()))
+        reduced = -np.array(solution.col_dual)[self._extra :]
+        return MasterPoint(value, use[self._extra :], duals, float(use[: self._extra].sum()), reduced)
 
     def reduced_values(self, duals: Duals) -> FloatArray:
         """Return value minus prices of every column held."""

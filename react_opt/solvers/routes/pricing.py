@@ -59,6 +59,7 @@ class RoutePricer:
     def __init__(self, problem: RouteProblem, memory: Memory) -> None:
         self.problem = problem
         self.memory = memory
+        self.labels = self.calls = 0  # of exact passes so far
         self.stop = np.zeros(1, np.uint8)  # not 0: labelling passes are given up at once
         n, horizon = problem.n_cells, problem.horizon
         by_target = np.lexsort((problem.arc_from, problem.arc_to))
@@ -203,6 +204,9 @@ class RoutePricer:
                 True,
                 self.stop,
             )
+            if width is None:
+                self.labels += len(labels.value)
+                self.calls += 1
             chosen, top = self._finals(labels, group, columns)
             found += [self.column(group, labels, label, cell) for label, cell in chosen]
             exact &= complete

@@ -14,6 +14,7 @@ from react_opt.solvers.routes.rows import violated_limits
 MOST_CUTS = 64
 MOST_CUTS_AT_ONCE = 20
 TINY = 1e-6
+HEAVY = 4.0
 
 
 class Tightening:
@@ -31,6 +32,8 @@ class Tightening:
         self.generation, self.memory = generation, memory
         self.master, self.pricer = generation.master, generation.pricer
         self.problem = self.pricer.problem
+        self._first_effort = 0.0
+        self._counted = (0, 0)
 
     def add_limits(self) -> bool:
         """Add limits between robots that the linear programme breaks; return whether there were any."""
@@ -41,10 +44,27 @@ class Tightening:
         self.master.add_rows(rows)
         return bool(rows)
 
-    def tighten(self) -> bool:
-        """Add cuts and let the memory grow; return whether anything changed."""
-        cut = self.cut()
-        return self.grow_memory() or cut
+    def tighten(self, *, cut: bool = True) -> bool:
+        """Let the memory grow and add cuts; return whether anything changed.
+
+        Parameters
+        ----------
+        cut
+            False adds cuts only where the memory does not grow.
+        """
+        if cut:
+            added = self.cut()
+            return self.grow_memory() or added
+        return self.grow_memory() or self.cut()
+
+    def heavy(self) -> bool:
+        """Return whether the pricing since the last call took many times the labels that it took at first."""
+        labels, calls = self.pricer.labels - self._counted[0], self.pricer.calls - self._counted[1]
+        self._counted = (self.pricer.labels, self.pricer.calls)
+        effort = labels / max(1, calls)
+        if self._first_effort == 0.0:
+            self._first_effort = effort
+        return effort > HEAVY * self._first_effort
 
     def grow_memory(self) -> bool:
         """Remember cells along the cycles of routes in use; return whether anything was added."""

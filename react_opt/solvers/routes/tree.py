@@ -23,7 +23,8 @@ CANDIDATES = 8
 LEAST_SHARE = 0.02  # of a cell on either side of a split
 ROUNDS = 3  # of tightening in one part
 WORTH_IT = 0.1  # share of the gap that a round has to close for another one
-LAST_ROUTES = 20_000
+MANY_PARTS = 60  # beyond which a part may be finished by enumeration
+EASY_ROUTES, LAST_ROUTES = 3_000, 20_000
 
 
 @dataclass
@@ -126,20 +127,39 @@ class Tree:
             if self.tightening.add_limits():
                 continue
             gained = standing.objective is None or before - part.bound > WORTH_IT * (part.bound - standing.objective)
-            if rounds == ROUNDS or (rounds > 0 and not gained) or not self.tightening.tighten():
+            if self.tightening.heavy() or rounds == ROUNDS or (rounds > 0 and not gained):
+                break
+            if not self.tightening.tighten():
                 break
             rounds += 1
+        if self.parts > MANY_PARTS and self._enumerated(part, EASY_ROUTES):
+            return
         split = self._choose(part)
         if split is None:
-            bound = self.finish.bound(part.known, LAST_ROUTES, anew=True)
-            if bound is not None and bound < part.bound:
-                part.bound, part.enumerated = bound, True
+            self._enumerated(part, LAST_ROUTES)
             return
         part.split = split
         part.yes = Part(part.region.side(split, True), part.known, part.bound)
         part.no = Part(part.region.side(split, False), part.known, part.bound)
         self._push(part.yes)
         self._push(part.no)
+
+    def _enumerated(self, part: Part, most: int) -> bool:
+        """Finish a part by enumeration; return whether it was possible."""
+        bound = self.finish.bound(part.known, most, anew=most > EASY_ROUTES)
+        if bound is None:
+            return False
+        part.bound, part.enumerated = min(part.bound, bound), True
+        return True
+
+    def notes(self) -> list[str]:
+        """Return how the bound came about, in words."""
+        if self.parts == 1 and not self.root.enumerated:
+            return []
+        notes = [f"bound from a tree of {self.parts} parts, split by when cells are collected"]
+        if self.finish.routes:
+            notes.append(f"parts of it rest on the enumeration of {self.finish.routes} routes, solved as MILPs")
+        return notes
 
     def _offer(self, point: MasterPoint | None) -> None:
         """Offer the linear programme's own plan, if it is whole."""
