@@ -6,52 +6,54 @@ A certificate holds prices. For any prices that are not negative
 
 is above every plan of the instance, where ``best_k`` is the most that one robot of class k can be worth once it
 pays the prices, even if it may collect a cell again after forgetting it (standing in cell j it remembers the
-cells of ``memory[j]``). ``best_k`` is computed here by a plain dynamic programme over instants, cells, memories
-and cut states. It shares nothing with the solver that made the claim: the motion, the battery and the rewards
-are stated again, on purpose.
+cells of ``memory[j]``).
+
+A certificate of a tree asks questions, "is the cell collected by this instant?" or "by one of these robots?". A plan
+that senses no cell in vain answers each with yes or no, so the largest bound of the leaves holds for all plans. In
+a leaf only the collections are priced that its answers leave, and the price of a cell that is collected in any case
+may be negative.
 """
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.certify_bound_route import Prices, best_route
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance, OrosRobot
 
-Floats = NDArray[np.float64]
-Words = NDArray[np.uint64]
-NEVER = -np.inf
-ONE = np.uint64(1)
-MARGIN = 1e-9
-FAR = 12
+DEEPEST = 900  # questions in a row
 
 
-class _States(NamedTuple):
-    """Partial routes in one cell at one instant: value after prices, memory, cut states, energy used."""
+@dataclass(frozen=True)
+class _Part:
+    """Plans in which each robot collects each cell within a window of instants only, and some cells in any case."""
 
-    value: Floats
-    memory: Words
-    cuts: Words
-    used_j: Floats
+    first: NDArray[np.int64]  # (n_robots, n_cells)
+    last: NDArray[np.int64]
+    must: NDArray[np.bool_]  # (n_cells,)
 
-
-class _Prices(NamedTuple):
-    """Prices of a certificate, in the words of the instance."""
-
-    cell: Floats
-    memory: list[list[int]]
-    cut_cells: list[set[int]]
-    cut_memory: list[set[int]]
-    cut_price: list[float]
-    stand: dict[tuple[int, int], float]
-    sense: dict[int, float]
-    rows_worth: float
+    def side(self, question: Mapping[str, Any], yes: bool) -> _Part:
+        """Return the plans of this part that answer a question with yes or no."""
+        i = int(question["cell"])
+        first, last, must = self.first.copy(), self.last.copy(), self.must.copy()
+        must[i] |= yes
+        if "by" in question:
+            t = int(question["by"])
+            if yes:
+                last[:, i] = np.minimum(last[:, i], t)
+            else:
+                first[:, i] = np.maximum(first[:, i], t + 1)
+        else:
+            named = np.isin(np.arange(len(first)), [int(r) for r in question["robots"]])
+            last[~named if yes else named, i] = -1
+        return _Part(first, last, must)
 
 
 def recompute_bound(instance: OrosInstance, certificate: Mapping[str, Any]) -> float:
@@ -69,23 +71,58 @@ def recompute_bound(instance: OrosInstance, certificate: Mapping[str, Any]) -> f
     UsageError
         If the certificate does not fit the instance or is of an unknown kind.
     """
-    if certificate.get("kind") != "lagrangian":
-        raise UsageError("the certificate is of an unknown kind; expected 'lagrangian'")
+    try:
+        return _recomputed(instance, certificate)
+    except (KeyError, TypeError, ValueError, IndexError) as fault:
+        raise UsageError(f"the certificate cannot be read: {type(fault).__name__}: {fault}") from fault
+
+
+def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float:
+    kind = certificate.get("kind")
+    if kind not in ("lagrangian", "tree"):
+        raise UsageError("the certificate is of an unknown kind; expected 'lagrangian' or 'tree'")
     if instance.chargers:
         raise UsageError("bounds of instances with chargers cannot be recomputed")
-    prices = _read(instance, certificate)
+    shape = (len(instance.robots), len(instance.cells))
+    whole = _Part(
+        np.zeros(shape, dtype=np.int64),
+        np.full(shape, instance.horizon_steps, dtype=np.int64),
+        np.zeros(shape[1], dtype=np.bool_),
+    )
+    memory = _memory(instance, certificate)
+    if kind == "lagrangian":
+        return _rounded(instance, _bound_of(instance, certificate, memory, whole))
+    worst, waiting = -math.inf, [(certificate["tree"], whole, 0)]
+    while waiting:
+        node, part, depth = waiting.pop()
+        if "cell" not in node:
+            worst = max(worst, _bound_of(instance, node, memory, part))
+            continue
+        if depth == DEEPEST or not 0 <= int(node["cell"]) < shape[1]:
+            raise UsageError("the certificate's tree is too deep or asks about a cell that the instance does not have")
+        waiting += [(node[side], part.side(node, side == "yes"), depth + 1) for side in ("yes", "no")]
+    return _rounded(instance, worst)
+
+
+def _bound_of(instance: OrosInstance, leaf: Mapping[str, Any], memory: list[list[int]], part: _Part) -> float:
+    """Return the bound on the plans of a part that the prices of a leaf prove."""
+    prices = _read(instance, leaf, memory, part)
     total = float(prices.cell.sum()) + sum(prices.cut_price) + prices.rows_worth
     seen: list[int] = []
-    for group in certificate["classes"]:
-        robots = [instance.robots[int(r)] for r in group["robots"]]
+    for group in leaf["classes"]:
+        index = [int(r) for r in group["robots"]]
+        robots = [instance.robots[r] for r in index]
         if any(_data(robot) != _data(robots[0]) for robot in robots):
             raise UsageError("the certificate puts robots with different data into one class")
-        seen += [int(r) for r in group["robots"]]
-        best = _best_route(instance, robots[0], prices, float(group["best"]), float(group.get("joule_price", 0)))
-        total += len(robots) * best
+        first, last = part.first[index], part.last[index]
+        if np.any(first != first[0]) or np.any(last != last[0]):
+            raise UsageError("the certificate puts robots into one class about which its questions differ")
+        seen += index
+        rate = float(group.get("joule_price", 0))
+        total += len(robots) * best_route(instance, robots[0], prices, float(group["best"]), rate, first[0], last[0])
     if sorted(seen) != list(range(len(instance.robots))):
         raise UsageError("the certificate does not name every robot once")
-    return _rounded(instance, total)
+    return total
 
 
 def _rounded(instance: OrosInstance, bound: float) -> float:
@@ -125,16 +162,28 @@ def _data(robot: OrosRobot) -> dict[str, Any]:
     return robot.model_dump(exclude={"id"})
 
 
-def _read(instance: OrosInstance, certificate: Mapping[str, Any]) -> _Prices:
-    """Return the prices of a certificate, negative ones raised to 0."""
-    n = len(instance.cells)
-    cell = np.maximum(0.0, np.array(certificate["cell_price"], dtype=np.float64))
-    if len(cell) != n:
-        raise UsageError(f"the certificate prices {len(cell)} cells, the instance has {n}")
-    memory = certificate["memory"]
+def _memory(instance: OrosInstance, certificate: Mapping[str, Any]) -> list[list[int]]:
+    """Return what is remembered in each cell."""
+    n, memory = len(instance.cells), certificate["memory"]
     memory = [list(range(n))] * n if memory == "all" else [sorted({int(c) for c in near}) for near in memory]
-    if any(len(near) > 64 for near in memory) or len(certificate["cuts"]) > 64:
-        raise UsageError("the certificate remembers more than 64 cells in one place or has more than 64 cuts")
+    if len(memory) != n or any(len(near) > 64 for near in memory):
+        raise UsageError(f"the certificate does not remember at most 64 cells in each of {n} places")
+    if any(not 0 <= cell < n for near in memory for cell in near) or any(
+        i not in near for i, near in enumerate(memory)
+    ):
+        raise UsageError("the certificate's memory of a place lacks the place or names cells that do not exist")
+    return memory
+
+
+def _read(instance: OrosInstance, certificate: Mapping[str, Any], memory: list[list[int]], part: _Part) -> Prices:
+    """Return prices, negative ones raised to 0 but for cells that are collected in any case."""
+    n = len(instance.cells)
+    cell = np.array(certificate["cell_price"], dtype=np.float64)
+    if len(cell) != n or not np.all(np.isfinite(cell)):
+        raise UsageError(f"the certificate prices {len(cell)} cells, the instance has {n}; prices are finite numbers")
+    cell = np.where(part.must, cell, np.maximum(0.0, cell))
+    if len(certificate["cuts"]) > 64:
+        raise UsageError("the certificate has more than 64 cuts")
     stand: dict[tuple[int, int], float] = {}
     sense: dict[int, float] = {}
     worth = 0.0
@@ -151,7 +200,7 @@ def _read(instance: OrosInstance, certificate: Mapping[str, Any]) -> _Prices:
             stand[t, int(row["cell"])] = stand.get((t, int(row["cell"])), 0.0) + price
         else:
             sense[t] = sense.get(t, 0.0) + price
-    return _Prices(
+    return Prices(
         cell,
         memory,
         [{int(c) for c in cut["cells"]} for cut in certificate["cuts"]],
@@ -160,217 +209,4 @@ def _read(instance: OrosInstance, certificate: Mapping[str, Any]) -> _Prices:
         stand,
         sense,
         worth,
-    )
-
-
-class _Moves(NamedTuple):
-    """Arcs by the cell they leave: (to, steps, energy)."""
-
-    out: list[list[tuple[int, int, float]]]
-    idle_j: float
-    sense_j: float
-
-
-def _gain(instance: OrosInstance, prices: _Prices, robot: OrosRobot, cell: int, t: int) -> float:
-    """Return what sensing a cell at an instant is worth after prices; minus infinity where it earns nothing."""
-    data = instance.cells[cell]
-    deadline = instance.horizon_steps if data.deadline_step is None else min(data.deadline_step, instance.horizon_steps)
-    if data.explored or t < max(1, robot.start_step) or t > deadline or data.weight <= 0:
-        return NEVER
-    earned = data.weight * (deadline - t + 1) - instance.sigma * robot.sensing_w * instance.step_s
-    return earned - float(prices.cell[cell]) - prices.sense.get(t, 0.0)
-
-
-def _best_route(instance: OrosInstance, robot: OrosRobot, prices: _Prices, claimed: float, joule_price: float) -> float:
-    """Return the most that a robot is worth after prices, or ``claimed`` if it is no more than that.
-
-    Partial routes that cannot end above ``claimed`` by a bound without memory are dropped; if any ends above
-    it the search has found the larger value.
-    """
-    n, last = len(instance.cells), instance.horizon_steps
-    index = {cell.id: i for i, cell in enumerate(instance.cells)}
-    moves = _Moves([[] for _ in range(n)], robot.idle_w * instance.step_s, robot.sensing_w * instance.step_s)
-    for arc in instance.travel:
-        moves.out[index[arc.from_]].append((index[arc.to], arc.steps, arc.energy_j))
-    end = None if robot.return_to is None else index[robot.return_to]
-    budget = robot.battery_j - robot.reserve_j
-    budget += 1e-9 * max(1.0, budget)
-    gain = np.array([[_gain(instance, prices, robot, i, t) for i in range(n)] for t in range(last + 1)])
-    later = np.zeros((last + 2, n))
-    later[: last + 1] = np.maximum.accumulate(np.maximum(gain, 0.0)[::-1])[::-1]
-    ahead = [_steps_to(moves, i, near) for i, near in enumerate(prices.memory)]
-    constant = instance.sigma * robot.battery_j
-    cutoff = claimed - constant
-    rests = [
-        (rate, _rest(instance, robot, prices, moves, gain, end, rate))
-        for rate in ([0.0, joule_price] if joule_price > 0 else [0.0])
-    ]
-    waiting: list[dict[int, list[_States]]] = [{} for _ in range(last + 1)]
-    nothing = np.zeros(1, dtype=np.uint64)
-    start = _States(np.zeros(1), nothing, nothing, np.zeros(1))
-    waiting[robot.start_step][index[robot.start]] = [start]
-    best = cutoff
-    for t in range(robot.start_step, last + 1):
-        for i, parts in waiting[t].items():
-            states = _joined(parts)
-            states = states._replace(value=states.value - prices.stand.get((t, i), 0.0))
-            states = _hopeful(states, t, i, rests, budget, best)
-            states = _undominated(
-                _sensed(states, i, gain[t, i], moves.sense_j, prices),
-                later[np.minimum(t + ahead[i], last + 1), prices.memory[i]],
-                prices,
-            )
-            states = _pick(states, states.used_j <= budget)
-            if len(states.value) == 0:
-                continue
-            if t == last:
-                if end is None or end == i:
-                    best = max(best, float(states.value.max()))
-                continue
-            idle = _States(
-                states.value - instance.sigma * moves.idle_j, states.memory, states.cuts, states.used_j + moves.idle_j
-            )
-            waiting[t + 1].setdefault(i, []).append(idle)
-            for j, steps, energy in moves.out[i]:
-                if t + steps <= last:
-                    waiting[t + steps].setdefault(j, []).append(
-                        _States(
-                            states.value - instance.sigma * energy,
-                            _remembered(states.memory, prices.memory[i], prices.memory[j]),
-                            states.cuts & _cut_mask(prices, j),
-                            states.used_j + energy,
-                        )
-                    )
-        waiting[t] = {}
-    return best + constant
-
-
-def _steps_to(moves: _Moves, cell: int, targets: list[int]) -> NDArray[np.int64]:
-    """Return the fewest steps from a cell to others, at least 1 (a cell cannot be sensed anew at once)."""
-    known = {cell: 0}
-    queue = [(0, cell)]
-    while queue:
-        distance, i = heapq.heappop(queue)
-        if distance > known[i] or distance > FAR:
-            continue
-        for j, steps, _ in moves.out[i]:
-            if distance + steps < known.get(j, FAR + 1):
-                known[j] = distance + steps
-                heapq.heappush(queue, (distance + steps, j))
-    return np.array([max(1, known.get(target, FAR + 1)) for target in targets], dtype=np.int64)
-
-
-def _rest(
-    instance: OrosInstance,
-    robot: OrosRobot,
-    prices: _Prices,
-    moves: _Moves,
-    gain: Floats,
-    end: int | None,
-    rate: float,
-) -> Floats:
-    """Return ``(T + 1, n)``: most that is earned from an arrival on, without memory, each joule costing ``rate``."""
-    n, last = len(instance.cells), instance.horizon_steps
-    joule = instance.sigma + rate
-    arc_from = np.array([i for i in range(n) for _ in moves.out[i]], dtype=np.int64)
-    arc_to = np.array([j for i in range(n) for j, _, _ in moves.out[i]], dtype=np.int64)
-    steps = np.array([d for i in range(n) for _, d, _ in moves.out[i]], dtype=np.int64)
-    energy = np.array([q for i in range(n) for _, _, q in moves.out[i]])
-    rest = np.full((last + 1, n), NEVER)
-    rest[last] = 0.0 if end is None else NEVER
-    if end is not None:
-        rest[last, end] = 0.0
-    entry = np.zeros((last + 1, n))
-    for (t, i), price in prices.stand.items():
-        entry[t, i] = price
-    for t in range(last, robot.start_step - 1, -1):
-        if t < last:
-            rest[t] = rest[t + 1] - entry[t + 1] - joule * moves.idle_j
-            fits = t + steps <= last
-            there = rest[t + steps[fits], arc_to[fits]] - entry[t + steps[fits], arc_to[fits]]
-            np.maximum.at(rest[t], arc_from[fits], there - joule * energy[fits])
-        rest[t] += np.maximum(0.0, gain[t] - rate * moves.sense_j)
-    return rest
-
-
-def _hopeful(
-    states: _States, t: int, cell: int, rests: list[tuple[float, Floats]], budget: float, best: float
-) -> _States:
-    """Return the states that may still end above ``best``."""
-    keep = np.ones(len(states.value), dtype=bool)
-    for rate, rest in rests:
-        keep &= states.value + rest[t, cell] + rate * (budget - states.used_j) > best + MARGIN * max(1.0, abs(best))
-    return _pick(states, keep & (states.used_j <= budget))
-
-
-def _sensed(states: _States, cell: int, gain: float, sense_j: float, prices: _Prices) -> _States:
-    """Return the states and, where the cell is not remembered, their twins that collect it."""
-    if gain == NEVER:
-        return states
-    bit = ONE << np.uint64(prices.memory[cell].index(cell))
-    fresh = _pick(states, (states.memory & bit) == 0)
-    value, cuts = fresh.value + gain, fresh.cuts
-    for k, cells in enumerate(prices.cut_cells):
-        if cell in cells:
-            mark = ONE << np.uint64(k)
-            value = value - prices.cut_price[k] * ((cuts & mark) != 0)
-            cuts = cuts ^ mark
-    twins = _States(value, fresh.memory | bit, cuts, fresh.used_j + sense_j)
-    return _joined([states, twins])
-
-
-def _remembered(memory: Words, here: list[int], there: list[int]) -> Words:
-    """Return memories carried from one place to another: what is remembered in both."""
-    if here == there:
-        return memory
-    position = {cell: k for k, cell in enumerate(there)}
-    carried = np.zeros_like(memory)
-    for k, cell in enumerate(here):
-        if cell in position:
-            carried |= ((memory >> np.uint64(k)) & ONE) << np.uint64(position[cell])
-    return carried
-
-
-def _cut_mask(prices: _Prices, cell: int) -> np.uint64:
-    """Return the cuts whose state survives in a cell."""
-    mask = 0
-    for k, cells in enumerate(prices.cut_memory):
-        if cell in cells:
-            mask |= 1 << k
-    return np.uint64(mask)
-
-
-def _undominated(states: _States, later: Floats, prices: _Prices) -> _States:
-    """Return the states that no other beats whatever comes next.
-
-    A state that remembers more, or has more odd cuts, still beats another if it is ahead by all that the other
-    could gain from that: ``later`` is the most that each remembered cell can still earn.
-    """
-    order = np.lexsort((states.used_j, -states.value))
-    states = _pick(states, order)
-    keep = np.ones(len(order), dtype=bool)
-    for k in range(len(order)):
-        if not keep[k]:
-            continue
-        rest = slice(k + 1, None)
-        lead = states.value[k] - states.value[rest]
-        for position in np.flatnonzero((states.memory[k] >> np.arange(len(later), dtype=np.uint64)) & ONE):
-            lead = lead - later[position] * (((states.memory[rest] >> np.uint64(position)) & ONE) == 0)
-        for cut, price in enumerate(prices.cut_price):
-            if (states.cuts[k] >> np.uint64(cut)) & ONE:
-                lead = lead - price * (((states.cuts[rest] >> np.uint64(cut)) & ONE) == 0)
-        keep[rest] &= ~((lead >= 0.0) & (states.used_j[k] <= states.used_j[rest]))
-    return _pick(states, keep)
-
-
-def _pick(states: _States, keep: NDArray[np.bool_] | NDArray[np.int64]) -> _States:
-    return _States(states.value[keep], states.memory[keep], states.cuts[keep], states.used_j[keep])
-
-
-def _joined(parts: list[_States]) -> _States:
-    return _States(
-        np.concatenate([part.value for part in parts]),
-        np.concatenate([part.memory for part in parts]),
-        np.concatenate([part.cuts for part in parts]),
-        np.concatenate([part.used_j for part in parts]),
     )

@@ -1,10 +1,15 @@
+import json
+
 import numpy as np
 import pytest
 
 from react_opt.certify_bound import recompute_bound
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance
+from react_opt.solvers.routes import engine
 from react_opt.solvers.routes.engine import solve_routes
+from react_opt.solvers.routes.finish import Finish
+from react_opt.solvers.routes.tightening import Tightening
 from react_opt.timegraph import route_problem
 
 
@@ -68,6 +73,69 @@ def test_any_prices_give_a_bound() -> None:
         changed = {**result.certificate, "cell_price": [factor * p for p in result.certificate["cell_price"]]}
         changed["classes"] = [{**group, "best": 0.0} for group in changed["classes"]]
         assert recompute_bound(instance, changed) >= result.objective - 1e-9
+
+
+def _walled(seed: int) -> OrosInstance:
+    """A grid of weighted cells for two or three robots; on odd seeds the batteries bind."""
+    rng = np.random.default_rng(seed)
+    cols, n, horizon = 4, 12, 11
+    edges = [(i, i + 1) for i in range(n) if (i + 1) % cols] + [(i, i + cols) for i in range(n - cols)]
+    battery_j = horizon * 239.0 * (0.5 if seed % 2 else 1.0)
+    robot = {"battery_j": battery_j, "capacity_j": battery_j, "idle_w": 2.0, "sensing_w": 16.9}
+    return OrosInstance.model_validate(
+        {
+            "kind": "oros",
+            "name": "walled",
+            "horizon_steps": horizon,
+            "step_s": 10.0,
+            "cells": [{"id": f"c{i}", "x_m": 0.0, "y_m": 0.0, "weight": float(rng.integers(1, 4))} for i in range(n)],
+            "travel": [
+                {"from": f"c{i}", "to": f"c{j}", "steps": 1, "energy_j": 70.0}
+                for edge in edges
+                if rng.random() < 0.9
+                for i, j in (edge, edge[::-1])
+            ],
+            "robots": [
+                {"id": f"r{k}", "start": start, **robot} for k, start in enumerate(["c0", "c0", "c11"][seed % 3 :])
+            ],
+        }
+    )
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4, 8, 10, 12, 13])
+def test_the_bound_of_a_tree_is_recomputed_from_its_leaves(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the tree was left half done; a leaf that claims too much is found out, one left out is refused."""
+    instance = _walled(seed)
+    problem = route_problem(instance)
+    best = solve_routes(problem, work_limit=6000).objective
+    assert best is not None
+    monkeypatch.setattr(engine, "FIRST_MEMORY", 1)
+    monkeypatch.setattr(Tightening, "cut", lambda self: False)
+    monkeypatch.setattr(Tightening, "grow_memory", lambda self: False)
+    monkeypatch.setattr(Finish, "bound", lambda self, *_, **__: None)
+    for work in (150, 6000):
+        result = solve_routes(problem, work_limit=work)
+        bound = recompute_bound(instance, result.certificate)
+        assert bound >= best - 1e-9 * best
+        assert bound <= result.bound + 1e-8 * best
+    assert result.certificate["kind"] == ("tree" if seed != 2 else "lagrangian")
+    if seed != 2:
+        forged = json.loads(json.dumps(result.certificate))
+        _lower(forged["tree"])
+        assert recompute_bound(instance, forged) >= best - 1e-9 * best
+        del forged["tree"]["no"]
+        with pytest.raises(UsageError, match="KeyError: 'no'"):
+            recompute_bound(instance, forged)
+
+
+def _lower(node: dict) -> None:
+    """Make every leaf of a certificate claim three less for each class."""
+    if "cell" in node:
+        _lower(node["yes"])
+        _lower(node["no"])
+    else:
+        for group in node["classes"]:
+            group["best"] -= 3.0
 
 
 def test_certificate_of_another_instance_is_refused() -> None:

@@ -18,8 +18,9 @@ MOST_LINES = 400
 # From the ground up. A part imports from its own layer and from those above it in this list, never from below.
 LAYERS = [
     {"errors", "references", "instance", "plan", "trace", "jsonio", "kernels"},
-    {"certify", "certify_base", "certify_replay", "certify_robot", "certify_oros", "certify_bound"}
-    | {"certify_assignment", "certify_inspection", "certify_trace", "certify_scans"},
+    {"certify", "certify_base", "certify_replay", "certify_robot", "certify_oros"}
+    | {"certify_bound", "certify_bound_route", "certify_assignment", "certify_inspection"}
+    | {"certify_trace", "certify_scans"},
     {"geometry", "energy", "timegraph", "route_problem", "paths", "options", "interrupt", "areas", "passages"}
     | {"jobs", "jobs_file", "jobs_worker", "jobs_ray"},
     {"models", "claims"},

@@ -10,6 +10,7 @@ from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.generation import Multipliers
 from react_opt.solvers.routes.memory import Memory
 from react_opt.solvers.routes.rows import SenseRow, StandRow
+from react_opt.solvers.routes.tree import Part
 
 
 def certificate(
@@ -36,6 +37,53 @@ def certificate(
         For each class a price of a joule at which the battery may be relaxed; it speeds up the recomputation and
         is of no consequence for the bound.
     """
+    return {
+        "kind": "lagrangian",
+        **_prices(problem, best, joule_price),
+        "memory": _remembered(memory),
+    }
+
+
+def tree_certificate(problem: RouteProblem, memory: Memory, root: Part, joule_price: Sequence[float]) -> dict[str, Any]:
+    """Return the certificate of a tree: its questions, and prices at each leaf.
+
+    An inner node is ``{"cell", "by" | "robots", "yes", "no"}``: is the cell collected by that instant, or by one of
+    those robots? A leaf holds what :func:`certificate` does but for the memory, which is the same everywhere.
+
+    Parameters
+    ----------
+    problem
+        The route problem.
+    memory
+        The ng-sets at the end; no bound of a leaf was computed with larger ones.
+    root
+        The whole tree.
+    joule_price
+        As for :func:`certificate`.
+    """
+
+    def written(part: Part) -> dict[str, Any]:
+        split = part.split
+        if split is None or part.yes is None or part.no is None:
+            return _prices(problem, part.known, joule_price)
+        robots = list(problem.classes[split.group].robots)
+        question = {"robots": robots} if split.by is None else {"by": split.by}
+        return {"cell": split.cell, **question, "yes": written(part.yes), "no": written(part.no)}
+
+    def proven(part: Part) -> float:
+        if part.split is None or part.yes is None or part.no is None:
+            return part.known.bound
+        return max(proven(part.yes), proven(part.no))
+
+    return {"kind": "tree", "bound": proven(root), "memory": _remembered(memory), "tree": written(root)}
+
+
+def _remembered(memory: Memory) -> str | list[list[int]]:
+    return "all" if memory.complete else [sorted(cells) for cells in memory.near]
+
+
+def _prices(problem: RouteProblem, best: Multipliers, joule_price: Sequence[float]) -> dict[str, Any]:
+    """Return the prices of a bound."""
     priced_cuts = [
         {"cells": sorted(cut.cells), "memory": sorted(cut.memory), "price": float(price)}
         for cut, price in zip(best.cuts, best.duals.cut, strict=True)
@@ -53,14 +101,12 @@ def certificate(
             continue
         priced_rows.append({**place, "price": float(price)})
     return {
-        "kind": "lagrangian",
         "bound": float(best.bound),
         "cell_price": [float(price) for price in best.duals.cell],
         "classes": [
             {"robots": list(group.robots), "best": float(worth), "joule_price": float(rate)}
             for group, worth, rate in zip(problem.classes, best.duals.group, joule_price, strict=True)
         ],
-        "memory": "all" if memory.complete else [sorted(cells) for cells in memory.near],
         "cuts": priced_cuts,
         "rows": priced_rows,
     }

@@ -12,7 +12,7 @@ from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes.background import beside
 from react_opt.solvers.routes.budget import Budget, OnProgress, Standing, stopping
-from react_opt.solvers.routes.certificate import certificate
+from react_opt.solvers.routes.certificate import certificate, tree_certificate
 from react_opt.solvers.routes.dual_ascent import DualAscent
 from react_opt.solvers.routes.finish import Finish
 from react_opt.solvers.routes.generation import Generation
@@ -157,6 +157,8 @@ class _Proof:
         assert self.generation.best is not None
         tree = Tree(self.generation, self.tightening, self.finish, self.standing, self.generation.best, self._between)
         tree.run()
+        if tree.root.split is not None:
+            self.proof = tree_certificate(self.problem, self.memory, tree.root, self.pricer.joule_prices)
         self.notes += tree.notes()
 
     def _between(self) -> None:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from react_opt.kernels import kernel
 from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.labelstore import NEVER, ORIGIN, WAIT, Fuel, Graph, Labels, Prices
+from react_opt.solvers.routes.ranking import sort_falling
 
 _DEBRUIJN = np.zeros(64, dtype=np.int64)
 for _position in range(64):
@@ -29,7 +30,6 @@ _ZERO = np.uint64(0)
 _ONE = np.uint64(1)
 _FACTOR = np.uint64(0x03F79D71B4CB0A89)
 _SHIFT = np.uint64(58)
-INSERTED = 40  # values that are sorted by insertion at most
 
 
 @kernel(inline="always")
@@ -37,26 +37,6 @@ def lowest_bit(word: np.uint64) -> int:
     """Return the position of the lowest bit of a word that is not zero."""
     low = word & (~word + _ONE)
     return int(_DEBRUIJN[(low * _FACTOR) >> _SHIFT])
-
-
-@kernel(inline="always")
-def sort_falling(value: FloatArray, count: int, order: IntArray) -> None:
-    """Write the indices of the first ``count`` values into ``order``, the largest first.
-
-    Most lists are short, where inserting is several times faster than a general sort and allocates nothing.
-    """
-    if count > INSERTED:
-        falling = np.argsort(-value[:count])
-        for k in range(count):
-            order[k] = falling[k]
-        return
-    for k in range(count):
-        v = value[k]
-        place = k
-        while place > 0 and value[order[place - 1]] < v:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = k
 
 
 @kernel(nogil=True)

@@ -100,3 +100,10 @@ class Labels(NamedTuple):
     parent: IntArray
     arc: IntArray
     sensed: NDArray[np.bool_]
+
+
+def no_labels() -> Labels:
+    """Return labels of length 0."""
+    none = np.zeros(0, dtype=np.int64)
+    bits: NDArray[np.uint64] = np.zeros(0, dtype=np.uint64)
+    return Labels(np.zeros(1, dtype=np.int64), np.zeros(0), bits, bits, np.zeros(0), none, none, np.zeros(0, np.bool_))

@@ -13,7 +13,7 @@ from react_opt.route_problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.columns import Column, Duals, Priced, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.labels import flat_values, grow_labels, trace
-from react_opt.solvers.routes.labelstore import NEVER, Fuel, Graph, Labels, Prices
+from react_opt.solvers.routes.labelstore import NEVER, Fuel, Graph, Labels, Prices, no_labels
 from react_opt.solvers.routes.memory import Memory
 from react_opt.solvers.routes.region import Region
 from react_opt.solvers.routes.routecolumn import route_column
@@ -66,7 +66,7 @@ class RoutePricer:
         self._in_arcs = by_target.astype(np.int64)
         self._in_start = np.searchsorted(problem.arc_to[by_target], np.arange(n + 1)).astype(np.int64)
         self._out_arcs = np.arange(problem.n_arcs, dtype=np.int64)
-        self._no_labels = _no_labels()
+        self._no_labels = no_labels()
         self._no_stand = np.zeros((1, 1))
         self.remember()
         self._origin = []
@@ -395,10 +395,3 @@ def _lowest_point(function: Callable[[float], float], guess: float, top: float) 
         else:
             low = left
     return 0.5 * (low + high)
-
-
-def _no_labels() -> Labels:
-    """Return labels of length 0."""
-    none = np.zeros(0, dtype=np.int64)
-    bits: NDArray[np.uint64] = np.zeros(0, dtype=np.uint64)
-    return Labels(np.zeros(1, dtype=np.int64), np.zeros(0), bits, bits, np.zeros(0), none, none, np.zeros(0, np.bool_))

@@ -1,4 +1,4 @@
-"""Kernels that only kernels call, and the stable sort that they share."""
+"""Kernels that only kernels call, and the sorts that they share."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 
 from react_opt.kernels import kernel
 from react_opt.route_problem import FloatArray, IntArray
+
+INSERTED = 40  # values that are sorted by insertion at most
 
 inner = kernel(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """Kernel that only kernels call: without the wrappers for Python, which take longer to compile than it does."""
@@ -33,3 +35,23 @@ def ranking(keys: FloatArray) -> IntArray:
         order, other = other, order
         run *= 2
     return order
+
+
+@kernel(inline="always")
+def sort_falling(value: FloatArray, count: int, order: IntArray) -> None:
+    """Write the indices of the first ``count`` values into ``order``, the largest first.
+
+    Most lists are short, where inserting is several times faster than a general sort and allocates nothing.
+    """
+    if count > INSERTED:
+        falling = np.argsort(-value[:count])
+        for k in range(count):
+            order[k] = falling[k]
+        return
+    for k in range(count):
+        v = value[k]
+        place = k
+        while place > 0 and value[order[place - 1]] < v:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = k
