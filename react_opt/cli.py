@@ -15,6 +15,7 @@ import typer
 from rich.console import Console
 
 from react_opt.cli_bench import bench
+from react_opt.cli_help import examples, kinds_begun, solvers_begun, strategies_begun
 from react_opt.errors import InputError, MissingPartError, ReactError, UsageError
 from react_opt.interrupt import Interruption
 
@@ -99,7 +100,7 @@ def version(
         raise typer.Exit
 
 
-@app.command()
+@app.command(epilog=examples("build"))
 def build(
     map_file: Annotated[str, typer.Argument(metavar="MAP", help="ROS map YAML, or MovingAI .map.")],
     fleet: Annotated[str, typer.Option("--fleet", help="Fleet file (JSON).")],
@@ -111,10 +112,7 @@ def build(
     output: Output = None,
     as_json: AsJson = False,
 ) -> int:
-    """Build an oros instance from a map and a fleet.
-
-    Example: react-opt build factory.yaml --fleet fleet.json --cell-m 10 --horizon-s 240 --step-s 10 -o factory.json
-    """
+    """Build an oros instance from a map and a fleet."""
     from react_opt.build import build as build_instance
     from react_opt.geometry import load_map
     from react_opt.jsonio import dumps, load, save
@@ -142,14 +140,16 @@ def build(
     return OK
 
 
-@app.command()
+@app.command(epilog=examples("solve"))
 def solve(
     instance_file: Annotated[
         str, typer.Argument(metavar="INSTANCE", help="Instance file (JSON), - for standard input.")
     ],
     output: Output = None,
     as_json: AsJson = False,
-    solver: Annotated[str | None, typer.Option("--solver", help="Backend, see react-opt solvers.")] = None,
+    solver: Annotated[
+        str | None, typer.Option("--solver", help="Backend, see react-opt solvers.", autocompletion=solvers_begun)
+    ] = None,
     method: Annotated[str, typer.Option("--method", help="auto, monolith or routes.")] = "auto",
     time_limit: Annotated[float, typer.Option("--time-limit", help="Seconds from call to answer.")] = 60.0,
     work_limit: Annotated[int | None, typer.Option("--work-limit", help="Counted work, for reproducible runs.")] = None,
@@ -162,8 +162,6 @@ def solve(
     """Solve an oros, assignment or inspection instance.
 
     Exit codes: 0 a plan, 2 bad input, 3 proven that no plan exists, 4 no plan found in time, 130 interrupted.
-
-    Example: react-opt solve factory.json --time-limit 10 -o plan.json
     """
     from react_opt.jsonio import dumps, load, require_writable, save
     from react_opt.planner import solve as solve_instance
@@ -207,7 +205,7 @@ def solve(
     return {"optimal": OK, "feasible": OK, "infeasible": INFEASIBLE, "no_plan": NO_PLAN}[plan.claim.status]
 
 
-@app.command()
+@app.command(epilog=examples("check"))
 def check(
     instance_file: Annotated[str, typer.Argument(metavar="INSTANCE", help="Instance file (JSON).")],
     plan_file: Annotated[str, typer.Argument(metavar="PLAN", help="Plan file (JSON).")],
@@ -216,8 +214,6 @@ def check(
     """Replay a plan (or the trace of a mission) without any solver and print each rule that it breaks.
 
     Exit codes: 0 the plan is right, 1 it breaks a rule (or belongs to another instance), 2 bad input.
-
-    Example: react-opt check factory.json plan.json
     """
     from react_opt.certify import check as check_plan
     from react_opt.jsonio import load
@@ -239,12 +235,14 @@ def check(
     return OK if certificate.ok else VIOLATED
 
 
-@app.command()
+@app.command(epilog=examples("simulate"))
 def simulate(
     mission_file: Annotated[str, typer.Argument(metavar="MISSION", help="Mission file (JSON), - for standard input.")],
     output: Annotated[str | None, typer.Option("-o", "--output", help="Trace to write, - for standard output.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON instead of a table.")] = False,
-    strategy: Annotated[str | None, typer.Option("--strategy", help="Instead of the mission's.")] = None,
+    strategy: Annotated[
+        str | None, typer.Option("--strategy", help="Instead of the mission's.", autocompletion=strategies_begun)
+    ] = None,
     robots: Annotated[int | None, typer.Option("--robots", help="Only the first N robots.")] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Instead of the mission's.")] = None,
     always_on: Annotated[bool, typer.Option("--always-on", help="Never switch sensors off.")] = False,
@@ -253,8 +251,6 @@ def simulate(
     """Simulate a mission: robots explore a map that only the simulator knows.
 
     Exit codes: 0 done, 2 bad input, 130 interrupted (the trace so far is written and can be resumed).
-
-    Example: react-opt simulate examples/factory/mission_3.json -o trace.json
     """
     from react_opt.jsonio import dumps, load, require_writable, save
     from react_opt.report.live import mission_bar
@@ -283,7 +279,7 @@ def simulate(
     return INTERRUPTED if trace.status == "stopped" else OK
 
 
-@app.command()
+@app.command(epilog=examples("show"))
 def show(
     files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Any file; two traces make one replay.")],
     output: Annotated[str, typer.Option("-o", "--output", help="Picture (.png, .svg, .pdf) or page (.html) to write.")],
@@ -291,16 +287,7 @@ def show(
     map_file: Annotated[str | None, typer.Option("--map", help="Occupancy map to draw below.")] = None,
     hide_truth: Annotated[bool, typer.Option("--hide-truth", help="Leave out walls that nobody has seen.")] = False,
 ) -> int:
-    """Draw a file: an instance, fleet, mission, plan or trace. The page of a trace is its replay.
-
-    Examples
-    --------
-      react-opt show plan.json -o plan.png
-
-      react-opt show plan.json --instance factory.json --map factory.yaml -o plan.svg
-
-      react-opt show react.json naive.json -o replay.html
-    """
+    """Draw a file: an instance, fleet, mission, plan or trace. The page of a trace is its replay."""
     from react_opt.report.show import show as show_files
 
     for line in show_files(files, output, instance=instance, map_file=map_file, truth=not hide_truth):
@@ -311,19 +298,20 @@ def show(
 app.command()(bench)
 
 
-@app.command()
-def schema(kind: Annotated[str, typer.Argument(metavar="KIND", help="For instance oros or oros_plan.")]) -> int:
-    """Print the JSON Schema of a kind of file.
-
-    Example: react-opt schema oros > oros.schema.json
-    """
+@app.command(epilog=examples("schema"))
+def schema(
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="For instance oros or oros_plan.", autocompletion=kinds_begun)
+    ],
+) -> int:
+    """Print the JSON Schema of a kind of file."""
     from react_opt.jsonio import json_schema
 
     print(json.dumps(json_schema(kind), indent=2))
     return OK
 
 
-@app.command()
+@app.command(epilog=examples("solvers"))
 def solvers() -> int:
     """List the solvers that are installed, with versions and what each can do."""
     from react_opt.report.tables import solvers_table

@@ -30,7 +30,7 @@ LAYERS = [
     {"sim"},
     {"limits"},
     {"report"},
-    {"cli_bench"},
+    {"cli_bench", "cli_help"},
     {"cli", "__main__"},
 ]
 CHECKER = LAYERS[1]
