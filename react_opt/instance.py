@@ -312,6 +312,8 @@ class Failure(Part):
 class Mission(Document):
     """A closed-loop mission on a map that only the simulator knows.
 
+    ``extent_m`` is what is known of the building's size: two opposite corners x0, y0, x1, y1 of a rectangle; by
+    default that of the areas which cover the map's floor. Where the building turns out larger, areas are added.
     ``switching`` is the rule by which sensors go off: where no pixel would become known (``no_new_pixel``), where
     less than 0.1 m^2 would per scan (``small_gain``), or in areas that are explored (``area_explored``, the
     paper's). With ``blocking`` off robots pass through each other. A robot without progress for ``stuck_s``
@@ -321,6 +323,7 @@ class Mission(Document):
     kind: Literal["mission"] = "mission"
     map: Annotated[str, Field(strict=True, min_length=1)]
     prior_map: Annotated[str, Field(strict=True, min_length=1)] | None = None
+    extent_m: tuple[Finite, Finite, Finite, Finite] | None = None
     cell_m: Positive
     horizon_s: Positive
     step_s: Positive

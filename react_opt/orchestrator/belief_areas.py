@@ -46,6 +46,7 @@ class _Area:
     labels: range = range(0)
     stats: IntArray = field(default_factory=lambda: np.zeros((0, 5), dtype=np.int64))
     known: int = 0
+    free: bool = False
     view: AreaView | None = None
 
     @property
@@ -117,8 +118,15 @@ class Areas:
 
     # --- how it is worked out ---
 
+    def fit(self) -> None:
+        """Add the areas that turn out to exist and fit all of them to the canvas, which may grow for that."""
+        if self._laid != self._map.window:
+            self._lay()
+        if self._discover():
+            self._lay()
+
     def refresh(self, reached: Bools, reachable: Bools) -> None:
-        """Bring all up to date.
+        """Bring all up to date, after :meth:`fit`.
 
         Parameters
         ----------
@@ -127,10 +135,6 @@ class Areas:
         reachable
             Blocks that they reach if unknown space is free.
         """
-        if self._laid != self._map.window:
-            self._lay()
-        if self._discover():
-            self._lay()
         fresh = [area for area in self._list if self._dirty(area.window)]
         for area in fresh:
             self._label(area)
@@ -144,6 +148,7 @@ class Areas:
         """Fit the areas' windows to a new canvas."""
         self._laid = self._map.window
         self._labels = np.full(self._map.deep.shape, -1, dtype=np.int32)
+        self._map.inside[:] = False
         for area in self._list:
             edges = []
             for start, first, count in (
@@ -153,6 +158,7 @@ class Areas:
                 ends = [ceil((edge - first) / self._map.k - 0.5 - 1e-9) for edge in (start, start + self._side)]
                 edges += [min(max(end, 0), count) for end in ends]
             area.window = np.array(edges, dtype=np.int64)
+            self._map.inside[area.window[0] : area.window[1], area.window[2] : area.window[3]] = True
         self._map.touched[:] = True
 
     def _dirty(self, window: IntArray) -> bool:
@@ -160,9 +166,7 @@ class Areas:
 
     def _discover(self) -> bool:
         """Add areas where known free space lies beyond the grid; tell whether there were any."""
-        outside = self._map.touched & (self._map.known > 0) & (self._map.solid == 0)
-        for area in self._list:
-            outside[area.window[0] : area.window[1], area.window[2] : area.window[3]] = False
+        outside = self._map.touched & (self._map.known > 0) & (self._map.solid == 0) & ~self._map.inside
         if not outside.any():
             return False
         rows, cols = np.nonzero((self._map.known > 0) & (self._map.solid == 0))
@@ -177,6 +181,8 @@ class Areas:
         ]
         for place in found:
             self._add(*place)
+            low = self._origin + np.array(place) * self._side
+            self._map.cover(floor(low[1]), ceil(low[1] + self._side), floor(low[0]), ceil(low[0] + self._side))
         return bool(found)
 
     @property
@@ -199,6 +205,7 @@ class Areas:
         area.labels = range(first, first + count)
         r0, r1, c0, c1 = area.window
         area.known = int(map_.known[r0:r1, c0:c1].sum())
+        area.free = bool(((map_.known[r0:r1, c0:c1] > 0) & (map_.solid[r0:r1, c0:c1] == 0)).any())
 
     def _counted(self) -> Bools:
         """Tell for each region number whether it connects through unknown to known free space."""
@@ -272,7 +279,7 @@ class Areas:
         if unknown:
             closed = provably_unseen(self._labels, counted, area.window, map_.solid, reachable, self._range_blocks)
         else:
-            closed = area.known == 0
+            closed = not area.free
         return AreaView(area.id, float(x), float(y), place, share, bool(closed))
 
 

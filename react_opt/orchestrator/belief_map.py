@@ -25,6 +25,7 @@ from react_opt.kernels import kernel
 
 PRIOR_OCCUPIED = 3
 BLOCK_M = 0.1
+ROOM_M = 1.0
 
 Cells = NDArray[np.uint8]
 IntArray = NDArray[np.int64]
@@ -44,7 +45,7 @@ class BeliefMap:
     cap_m
         Clearances are exact up to this, m.
     prior
-        A sketch of the building in the same frame's resolution, or None.
+        A sketch of the building, at whatever resolution, or None.
     """
 
     def __init__(
@@ -82,11 +83,14 @@ class BeliefMap:
             _count_all(near, disc)
         self.touched = np.zeros(blocks, dtype=np.bool_)
         """Blocks whose unknown or free state changed since somebody cleared this."""
+        self.inside = np.ones(blocks, dtype=np.bool_)
+        """Blocks of the areas: beyond them unknown space is not taken to be free."""
         if self._prior is not None:
-            rows, cols = np.nonzero(self._prior.cells == OCCUPIED)
-            points = self._prior.pixel_to_world(np.stack((cols, rows), axis=1) + 0.5)
-            pixels = np.floor(self.frame.world_to_pixel(points)).astype(np.int64)
-            self._apply(pixels[:, 1], pixels[:, 0], np.full(len(pixels), PRIOR_OCCUPIED, dtype=np.uint8))
+            rows, cols = np.indices(shape).reshape(2, -1)
+            centres = np.stack((cols, rows), axis=1) + 0.5
+            said = self._prior.values_at(self.to_world(centres)) == OCCUPIED
+            rows, cols = rows[said] + low_row, cols[said] + low_col
+            self._apply(rows, cols, np.full(len(rows), PRIOR_OCCUPIED, dtype=np.uint8))
 
     @property
     def window(self) -> tuple[int, int, int, int]:
@@ -104,13 +108,7 @@ class BeliefMap:
             return 0
         low_row, high_row, low_col, high_col = self.window
         if r.min() < low_row or r.max() >= high_row or c.min() < low_col or c.max() >= high_col:
-            room = ceil(2.0 / self.frame.resolution_m)
-            self._grow(
-                min(low_row, int(r.min()) - room),
-                max(high_row, int(r.max()) + 1 + room),
-                min(low_col, int(c.min()) - room),
-                max(high_col, int(c.max()) + 1 + room),
-            )
+            self.cover(int(r.min()), int(r.max()) + 1, int(c.min()), int(c.max()) + 1)
         changed = self._apply(r, c, np.asarray(values, dtype=np.uint8))
         if changed:
             self.version += 1
@@ -118,9 +116,6 @@ class BeliefMap:
 
     def _apply(self, rows: IntArray, cols: IntArray, values: Cells) -> int:
         r, c = rows - self.row0, cols - self.col0
-        inside = (r >= 0) & (c >= 0) & (r < self.cells.shape[0]) & (c < self.cells.shape[1])
-        if not inside.all():  # of the prior map only: it may be larger than the building is said to be
-            r, c, values = r[inside], c[inside], values[inside]
         flipped, count, changed, freed = _merge(
             self.cells, self.known, self.solid, self.clear, self.deep, self.touched, self.k, self.cap_px, r, c, values
         )
@@ -130,9 +125,22 @@ class BeliefMap:
             _reclear(self.cells, self.clear, self.k, self.cap_px, freed)
         return int(changed)
 
-    def _grow(self, low_row: int, high_row: int, low_col: int, high_col: int) -> None:
+    def cover(self, low_row: int, high_row: int, low_col: int, high_col: int) -> None:
+        """Grow the canvas, where need be, to hold a window of the frame and some room around it."""
+        window = self.window
+        if window[0] <= low_row and high_row <= window[1] and window[2] <= low_col and high_col <= window[3]:
+            return
+        room = ceil(ROOM_M / self.frame.resolution_m)
         before, row0, col0 = self.cells, self.row0, self.col0
-        self._lay((low_row, high_row, low_col, high_col))
+        self._lay(
+            (
+                min(window[0], low_row - room),
+                max(window[1], high_row + room),
+                min(window[2], low_col - room),
+                max(window[3], high_col + room),
+            )
+        )
+        self.version += 1
         rows, cols = np.nonzero(before <= OCCUPIED)
         self._apply(rows + row0, cols + col0, before[rows, cols])
         self.touched[:] = True
@@ -159,7 +167,8 @@ class BeliefMap:
     def passable(self, layer: int, optimistic: bool) -> NDArray[np.bool_]:
         """Return the blocks on whose centre the disc of a layer's radius may stand."""
         room = self.clear >= self.radii_m[layer] / self.frame.resolution_m - 1e-6
-        return room if optimistic else room & (self.near[layer] == 0)
+        known = self.near[layer] == 0
+        return np.asarray(room & (known | self.inside) if optimistic else room & known)
 
 
 def _disc(radius_px: float, k: int) -> IntArray:

@@ -19,7 +19,7 @@ from react_opt.geometry.raycast import ray_table, rays_px, unknown_ahead_px
 from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget, RobotView
 from react_opt.orchestrator.belief_areas import Areas
 from react_opt.orchestrator.belief_avoid import SLOWER, first_clear, without_discs
-from react_opt.orchestrator.belief_map import BeliefMap
+from react_opt.orchestrator.belief_map import ROOM_M, BeliefMap
 from react_opt.orchestrator.belief_paths import Field, nearest_block, search, slowness, way_to
 from react_opt.orchestrator.belief_regions import flood
 
@@ -66,7 +66,7 @@ class FleetBelief:
         cap = max(max(p.full_speed_clearance_m, 3 * p.radius_m) for p in self._profiles)
         corners = frame.world_to_pixel(np.array(extent_m, dtype=np.float64).reshape(2, 2))
         low, high = corners.min(axis=0), corners.max(axis=0)
-        room = ceil(1.0 / frame.resolution_m)
+        room = ceil(ROOM_M / frame.resolution_m)
         window = (floor(low[1]) - room, ceil(high[1]) + room, floor(low[0]) - room, ceil(high[0]) + room)
         self._map = BeliefMap(frame, window, radii, cap, prior)
         self._areas = Areas(self._map, low, high, cell_m, range_m)
@@ -75,6 +75,7 @@ class FleetBelief:
         self._fresh = (-1, -1)
         self._slow: dict[tuple[int, bool], Slowness] = {}
         self._fields: dict[tuple[int, bool, int], Field] = {}
+        self._planned = -1
         self._marks = np.zeros((1, 1), dtype=np.int32)
         self._mark = 0
         self.t_s = 0.0
@@ -269,6 +270,7 @@ class FleetBelief:
         if self._fresh == (self._map.version, self._reported):
             return
         self._fresh = (self._map.version, self._reported)
+        self._areas.fit()
         alive = [robot for robot in self._robots.values() if robot.state != "dead"]
         reached = [flood(self._map.passable(0, unknown), self._starts(alive, unknown)) for unknown in (False, True)]
         self._areas.refresh(reached[0], reached[1])
@@ -329,7 +331,8 @@ class FleetBelief:
         return rows
 
     def _forget(self) -> None:
-        if getattr(self, "_planned", -1) != self._map.version:
+        if self._planned != self._map.version:
+            self._areas.fit()
             self._planned = self._map.version
             self._slow.clear()
             self._fields.clear()

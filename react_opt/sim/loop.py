@@ -21,6 +21,7 @@ from react_opt.orchestrator.fleet_belief import FleetBelief
 from react_opt.orchestrator.registry import make_strategy
 from react_opt.orchestrator.strategy import Decision, Order, Strategy, StrategyOptions
 from react_opt.sim.link import Channel
+from react_opt.sim.news import News
 from react_opt.sim.record import Recorder
 from react_opt.sim.robot import SimRobot
 from react_opt.sim.rules import Rules
@@ -73,9 +74,8 @@ class Simulation:
         range_m = max(profile.lidar_range_m for profile in used)
         self.mission = mission
         self.world = World(truth, min(profile.radius_m for profile in used), range_m, starts)
-        self.belief = FleetBelief(
-            truth, self.world.extent_m(mission.cell_m), mission.cell_m, used, range_m=range_m, prior=prior
-        )
+        extent_m = mission.extent_m or self.world.extent_m(mission.cell_m)
+        self.belief = FleetBelief(truth, extent_m, mission.cell_m, used, range_m=range_m, prior=prior)
         self.strategy = make_strategy(mission.strategy, options_of(mission)) if strategy is None else strategy
         seeds = np.random.SeedSequence(mission.seed).spawn(len(mission.robots))
         self.robots = []
@@ -87,9 +87,10 @@ class Simulation:
             robot.anchor = (robot.u_m, robot.v_m, 0.0)
             self.robots.append(robot)
         self._by_id = {robot.id: robot for robot in self.robots}
+        self.record = Recorder(mission, self.world, SCAN_S)
+        self.news = News(self.belief, self.record)
         self.lidars = Lidars(mission, self.world)
         self.traffic = Traffic(self.world, self.robots, mission.blocking)
-        self.record = Recorder(mission, self.world, SCAN_S)
         self.rules = Rules(self.world, self.robots, self.belief, self.record) if mission.blocking else None
         self.channel = Channel(mission.link, self.world, self.robots)
         self._late: dict[str, Order] = {}
@@ -198,7 +199,7 @@ class Simulation:
         for robot in self.robots:
             if self.channel.linked(robot) or not self._ticks:
                 self.belief.report(self._view(robot))
-        _ = self.belief.areas  # the switching rules go by what the areas were at the last decision
+        self.news.note(self.t_s)  # the switching rules go by what the areas were at the last decision
         begun = time.perf_counter()
         decision = self.strategy.decide(self.belief)
         self.record.decisions_wall_s.append(time.perf_counter() - begun)

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from react_opt.certify_trace import check_trace
+from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.instance import Noise
 from react_opt.sim.loop import Simulation
 from react_opt.trace import NEVER, Trace
@@ -55,3 +57,30 @@ def test_a_robot_dies_and_the_other_goes_on() -> None:
     assert trace.frames[-1].coverage > 0.97
     places = {(frame.robots[0].x_m, frame.robots[0].y_m) for frame in trace.frames if frame.t_s >= 8}
     assert len(places) == 1
+
+
+def test_a_building_larger_than_was_said_gets_more_areas() -> None:
+    trace = Simulation(
+        mission([(1.5, 1.5), (1.5, 4.0)], extent_m=(0.0, 0.0, 6.0, 8.0), horizon_s=90.0), TWO_ROOMS
+    ).run()
+    assert {event.target for event in trace.events if event.type == "area_added"} == {"1,0", "1,1"}
+    assert trace.frames[-1].coverage > 0.97
+
+
+def test_a_wrong_sketch_costs_time_but_not_the_mission() -> None:
+    """The sketch closes the door between the two rooms and opens a wall; what is seen counts."""
+    sketch = TWO_ROOMS.cells.copy()
+    sketch[34:46, 59:61] = 1
+    sketch[10:20, 59:61] = 0
+    prior = OccupancyMap(sketch, 0.1)
+    trace = Simulation(mission([(1.5, 1.5)], horizon_s=90.0, prior_map="sketch.yaml"), TWO_ROOMS, prior).run()
+    assert trace.frames[-1].coverage > 0.97
+
+
+def test_a_map_that_is_turned_is_driven_all_the_same() -> None:
+    turned = OccupancyMap(TWO_ROOMS.cells, 0.1, 3.0, -2.0, 0.5)
+    starts = [tuple(map(float, turned.pixel_to_world((x * 10, y * 10)))) for x, y in ((1.5, 1.5), (1.5, 4.0))]
+    of = mission(starts)
+    trace = Simulation(of, turned).run()
+    assert trace.frames[-1].coverage > 0.97
+    assert check_trace(of, trace, turned.cells).violations == ()
