@@ -132,16 +132,13 @@ def _solving(entry: Entry, name: str, suite: Suite, settings: Settings) -> Job:
 
 def prepare(jobs: Sequence[Job]) -> Record | None:
     """Compile kernels before any run is timed: a minute or two at the first use on a machine."""
-    kinds = sorted(
-        {
-            job.arguments["case"].get("kind") or FAMILIES[job.arguments["case"]["family"]].kind
-            for job in jobs
-            if job.target == "benchmarks.trial:run"
-        }
-    )
-    if not kinds:
+    cases = [job.arguments["case"] for job in jobs if job.target == "benchmarks.trial:run"]
+    if not cases:
         return None
-    return run_one(Job("prepare", "benchmarks.trial:prepare", {"kinds": kinds}, time_limit_s=PREPARE_S))
+    families = sorted({case["family"] for case in cases if "family" in case})
+    kinds = sorted({case.get("kind") or FAMILIES[case["family"]].kind for case in cases})
+    arguments = {"kinds": kinds, "families": families}
+    return run_one(Job("prepare", "benchmarks.trial:prepare", arguments, time_limit_s=PREPARE_S))
 
 
 def run(

@@ -24,8 +24,10 @@ WARM_S = 20.0  # for a solver's first go at tiny instances, which loads its libr
 CERTIFY_S = 60.0  # for the independent recomputation of a bound
 
 
-def prepare(kinds: list[str]) -> None:
+def prepare(kinds: list[str], families: list[str]) -> None:
     """Compile what is compiled, once on a machine, so that no run pays for it."""
+    if "factory" in families:  # built from a map
+        FAMILIES["factory"].make(seed=0, **FAMILIES["factory"].sizes["tiny"])
     for kind in kinds:
         for instance in tiny_instances(kind):
             PEERS["react_opt"].solve(instance, Limits(WARM_S), lambda *_: None)

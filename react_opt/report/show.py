@@ -33,7 +33,8 @@ def show(
     Parameters
     ----------
     files
-        An instance, fleet, mission, plan or trace; two traces make a replay side by side.
+        An instance, fleet, mission, plan or trace, or the results of ``react-opt bench`` (``.jsonl``, whose report
+        is ``.html`` or ``.md``); two traces make a replay side by side.
     output
         What to write: ``.png``, ``.svg`` or ``.pdf`` is a picture, ``.html`` a page that needs nothing else
         (for a trace the replay).
@@ -60,6 +61,11 @@ def show(
         Where matplotlib is not installed and a figure needs it.
     """
     suffix = Path(output).suffix.lower()
+    if len(files) == 1 and Path(files[0]).suffix == ".jsonl":  # the results of react-opt bench
+        from benchmarks.report import write
+
+        write(files[0], str(output))
+        return []
     if suffix not in SUFFIXES:
         raise UsageError(f"-o: expected a file that ends in {', '.join(SUFFIXES)}, found {str(output)!r}")
     documents = [load(file) for file in files]

@@ -71,6 +71,15 @@ def test_the_report_names_the_liars_and_the_losses(finished: Path) -> None:
     assert "http" not in page.replace("http-equiv", "")  # opens from disk, loads nothing
 
 
+def test_show_makes_the_report_of_a_results_file(finished: Path, tmp_path: Path) -> None:
+    from react_opt.report.show import show
+
+    show([finished / "results.jsonl"], tmp_path / "page.html")
+    assert "is beaten by a checked plan" in (tmp_path / "page.html").read_text()
+    with pytest.raises(UsageError, match=r"ends in \.md or \.html"):
+        show([finished / "results.jsonl"], tmp_path / "page.png")
+
+
 def test_a_stopped_run_goes_on_and_gives_the_same_report(finished: Path, tmp_path: Path) -> None:
     """Of the finished file all but three runs are lost, and half a line is left of the fourth."""
     lines = (finished / "results.jsonl").read_text().splitlines(keepends=True)
