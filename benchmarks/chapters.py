@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks import figures, measures, page
-from benchmarks.verdicts import by_instance, confirmation, is_right, truth_of
+from benchmarks.verdicts import case_of, confirmation, is_right, meetings, truths_of
 
 Run = Mapping[str, Any]
 MARGIN, LEAST_S = 1.2, 0.05  # what counts as faster: a fifth, and more than a twentieth of a second
@@ -15,12 +15,12 @@ MARGIN, LEAST_S = 1.2, 0.05  # what counts as faster: a fifth, and more than a t
 
 def losses(runs: Sequence[Run], wrong: set[tuple[str, str]], ours: str) -> list[page.Block]:
     """Return every instance on which another solver did better than ours, and how."""
-    rows = []
-    for group in by_instance(runs).values():
+    rows, truths = [], truths_of(runs)
+    for group in meetings(runs):
         mine = next((run for run in group if run["peer"] == ours), None)
         if mine is None:
             continue
-        truth = truth_of(group)
+        truth = truths[case_of(group[0])]
         solved = measures.is_solved(mine, wrong)
         if not measures.has_best(mine, truth) and truth.best is not None:
             found = f"{mine['objective']:.6g}" if is_right(mine) else "no plan"
@@ -46,9 +46,9 @@ def losses(runs: Sequence[Run], wrong: set[tuple[str, str]], ours: str) -> list[
 def details(runs: Sequence[Run], wrong: set[tuple[str, str]]) -> list[page.Block]:
     """Return a table of all instances: the best plan and bound, and each solver's time, or gap at the limit."""
     peers = list(dict.fromkeys(run["peer"] for run in runs))
-    rows = []
-    for group in by_instance(runs).values():
-        truth = truth_of(group)
+    rows, truths = [], truths_of(runs)
+    for group in meetings(runs):
+        truth = truths[case_of(group[0])]
         known = {run["peer"]: run for run in group}
         state = "infeasible" if truth.infeasible else "optimal" if truth.optimal else "open"
         rows.append([

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import measures
-from benchmarks.verdicts import by_instance, is_right, truth_of
+from benchmarks.verdicts import case_of, is_right, meetings, truths_of
 
 # Okabe and Ito's palette, which all common kinds of colour vision tell apart, and two more.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#7F7F7F", "#8C510A", "#999933")
@@ -86,12 +86,12 @@ def over_time(runs: Sequence[Run], wrong: set[tuple[str, str]], kind: str, what:
         ``proven`` (between plan and bound) or ``primal`` (between plan and the best known plan; the area under the
         line is the primal integral).
     """
-    groups = list(by_instance(runs).values())
+    groups, truths = meetings(runs), truths_of(runs)
     limit = max(float(run["limit_s"]) for group in groups for run in group)
     at_s = np.geomspace(0.01, limit, measures.GAP_POINTS)
     sums: dict[str, list[FloatArray]] = {}
     for group in groups:
-        best = truth_of(group).best
+        best = truths[case_of(group[0])].best
         if best is None:
             continue
         for run in group:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.verdicts import SOLVED, Exposure, Truth, by_instance, is_right, truth_of
+from benchmarks.verdicts import SOLVED, Exposure, Truth, case_of, is_right, meetings, truths_of
 
 SHIFT_S = 1.0
 GAP_POINTS = 60
@@ -84,12 +84,10 @@ class Standing:
 def standings(runs: Sequence[Run], exposed: Sequence[Exposure]) -> list[Standing]:
     """Return how each solver did, the one that solved most (then the fastest) first."""
     wrong = {(item.peer, item.instance) for item in exposed}
-    truths = {key: truth_of(group) for key, group in by_instance(runs).items()}
+    truths = truths_of(runs)
     rows = []
     for peer in dict.fromkeys(run["peer"] for run in runs):
-        mine: list[tuple[Run, Truth]] = [
-            (run, truths[key]) for key, group in by_instance(runs).items() for run in group if run["peer"] == peer
-        ]
+        mine: list[tuple[Run, Truth]] = [(run, truths[case_of(run)]) for run in runs if run["peer"] == peer]
         integrals = [value for run, truth in mine if (value := primal_integral(run, truth.best)) is not None]
         rows.append(
             Standing(
@@ -151,7 +149,7 @@ def profile(runs: Sequence[Run], wrong: set[tuple[str, str]]) -> dict[str, NDArr
     """
     peers = list(dict.fromkeys(run["peer"] for run in runs))
     ratios: dict[str, list[float]] = {peer: [] for peer in peers}
-    for group in by_instance(runs).values():
+    for group in meetings(runs):
         times = {run["peer"]: max(0.01, counted_s(run, wrong)) if is_solved(run, wrong) else math.inf for run in group}
         if set(times) != set(peers) or math.isinf(min(times.values())):
             continue

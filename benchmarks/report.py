@@ -16,7 +16,7 @@ from rich.text import Text as RichText
 from benchmarks import figures, measures, page
 from benchmarks.chapters import certificates, details, losses, path_table, refusals, scaling_table
 from benchmarks.runner import runs_of
-from benchmarks.verdicts import Exposure, by_instance, exposures
+from benchmarks.verdicts import Exposure, by_instance, exposures, meetings
 from react_opt.errors import InputError, UsageError
 from react_opt.jobs_file import read_lines
 
@@ -197,7 +197,7 @@ def _pictures(runs: Sequence[dict[str, Any]], wrong: set[tuple[str, str]], kind:
 def fields_of(runs: Sequence[dict[str, Any]]) -> list[tuple[str, list[dict[str, Any]]]]:
     """Return the runs by the set of solvers that met, so that means compare: each with a name, the largest first."""
     fields: dict[tuple[str, frozenset[str]], list[dict[str, Any]]] = {}
-    for group in by_instance(runs).values():
+    for group in meetings(runs):
         key = (kind_of(group[0]), frozenset(run["peer"] for run in group))
         fields.setdefault(key, []).extend(group)  # type: ignore[arg-type]
     found = []

@@ -70,12 +70,31 @@ def is_right(run: Run) -> bool:
     return run.get("objective") is not None and not run["violations"] and run["status"] in ("optimal", "feasible")
 
 
+def case_of(run: Run) -> str:
+    """Return what tells an instance from others: where it came from."""
+    return json.dumps(run["case"], sort_keys=True)
+
+
 def by_instance(runs: Iterable[Run]) -> dict[str, list[Run]]:
-    """Return the runs that met on each instance, by where it came from."""
+    """Return the runs on each instance under whatever limits: what one of them found is held against all."""
     groups: dict[str, list[Run]] = defaultdict(list)
     for run in runs:
-        groups[json.dumps([run["case"], run["gap_asked"]], sort_keys=True)].append(run)
+        groups[case_of(run)].append(run)
     return groups
+
+
+def meetings(runs: Iterable[Run]) -> list[list[Run]]:
+    """Return the runs that met on an instance under the same limits: what can be compared."""
+    groups: dict[str, list[Run]] = defaultdict(list)
+    for run in runs:
+        limits = [run.get(key) for key in ("gap_asked", "limit_s", "threads", "seed")]
+        groups[json.dumps([case_of(run), *limits])].append(run)
+    return list(groups.values())
+
+
+def truths_of(runs: Iterable[Run]) -> dict[str, Truth]:
+    """Return what all answers establish of each instance, by :func:`case_of`."""
+    return {case: truth_of(group) for case, group in by_instance(runs).items()}
 
 
 def truth_of(runs: Sequence[Run]) -> Truth:
@@ -85,7 +104,7 @@ def truth_of(runs: Sequence[Run]) -> Truth:
     bounds = [run["bound"] for run in runs if run.get("bound") is not None]
     if best is None:
         return Truth(None, "", min(bounds, default=None), False, any(run["status"] == "infeasible" for run in runs))
-    slack = agreed(best, runs[0]["tolerance"])
+    slack = agreed(best, plans[0]["tolerance"])
     near = [run for run in plans if run["objective"] >= best - slack]
     first = min(near, key=lambda run: run["wall_s"])
     standing = [bound for bound in bounds if bound >= best - slack]

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.verdicts import confirmation, exposures, truth_of
+from benchmarks.verdicts import confirmation, exposures, meetings, truth_of
 
 CASE = {"family": "f", "parameters": {}, "seed": 1}
 
@@ -95,3 +95,9 @@ def test_a_second_objective_that_is_undercut_is_exposed() -> None:
 def test_runs_of_other_instances_say_nothing() -> None:
     other = {**run("liar", 5.0, 5.0, "optimal"), "case": {**CASE, "seed": 2}}
     assert faults(run("a", 10.0, None), other) == []
+
+
+def test_what_was_found_under_other_limits_is_held_against_an_answer() -> None:
+    longer = {**run("a", 10.0, None), "limit_s": 100.0}
+    assert faults(longer, run("liar", 8.0, 9.0)) == [("liar", "bound")]
+    assert len(meetings([longer, run("liar", 8.0, 9.0), run("b", 7.0, None)])) == 2
