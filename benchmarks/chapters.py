@@ -72,7 +72,7 @@ def _cell(run: Run | None, wrong: set[tuple[str, str]]) -> str:
         return f"{run['wall_s']:.2f}"
     gap = measures.gap_of(run)
     if is_right(run):
-        return "plan" if gap is None else f"gap {100 * gap:.2g} %"
+        return "plan" if gap is None else "gap > 100 %" if gap > 1 else f"gap {100 * gap:.2g} %"
     return "none" if run["status"] == "no_plan" else str(run["status"])
 
 

@@ -146,7 +146,7 @@ def confirmation(run: Run) -> str:
     """Return what became of a bound's certificate.
 
     ``confirmed``: recomputed, and no worse than claimed. ``partly``: weaker than claimed, but the claim's notes say
-    what else the bound rests on (``bound from ...``). ``refuted``: weaker, and nothing else was given. ``not
+    that the bound also rests on an enumeration, which a certificate cannot hold. ``refuted``: weaker, and nothing else was given. ``not
     recomputed``: not within its time. ``none``: no certificate.
     """
     certified, bound = run.get("certified"), run.get("bound")
@@ -156,7 +156,7 @@ def confirmation(run: Run) -> str:
         return "refuted" if "certificate" in certified["why"] else "not recomputed"
     if certified["bound"] <= bound + 2 * agreed(bound, run["tolerance"]):
         return "confirmed"
-    return "partly" if any("bound from" in note for note in run.get("notes", [])) else "refuted"
+    return "partly" if any("enumeration" in note for note in run.get("notes", [])) else "refuted"
 
 
 def _secondary(run: Run, group: Sequence[Run], slack: float) -> list[tuple[str, str]]:
