@@ -193,7 +193,7 @@ class Decomposition:
             self.primal.run(PORTION)
         if done() or self._enumerate(duals, second, FEW_LABELS, FEW_COLUMNS):
             return True
-        while self.elementary and not done() and self.master.cut(MOST_CUTS):
+        while not done() and (self.master.cut(MOST_CUTS) if self.elementary else self._grow()):
             duals = self._generate(second)
             if duals is None:
                 return done()
@@ -234,7 +234,7 @@ class Decomposition:
                 bound = self._bound(used, profits, second)
                 if bound > most:
                     most, centre = bound, used
-            if done() or self._bound_stands(duals, second):
+            if done() or (late and not self.elementary and self._bound_stands(duals, second)):
                 return None
             if best[1]:
                 share = 0.0 if self.elementary else SMOOTHING
@@ -247,6 +247,14 @@ class Decomposition:
                 return duals
         return None
 
+    def _grow(self) -> bool:
+        """Forbid the cycles of the routes in use, and the columns with them; False where there are none."""
+        columns, used = self.master.columns, np.flatnonzero(self.master.x > 1e-6).tolist()
+        cycles = [p for p in used if len(set(columns[p].stops)) < len(columns[p].stops)]
+        grown = [self.pricers[columns[p].group].grow(columns[p].stops) for p in cycles]
+        self.master.ban([p for p, column in enumerate(columns) if not self.pricers[column.group].allows(column.stops)])
+        return any(grown)
+
     def _late(self) -> bool:
         left_s, deadline = self.control.left_s(), self.control.deadline
         if left_s is None or deadline is None or self.control.work_limit is not None:
@@ -256,9 +264,9 @@ class Decomposition:
     def _bound_stands(self, duals: Duals, second: bool) -> bool:
         """Whether more pricing cannot tighten the bound's last digit, and it is too far off to be met by a choice."""
         answer = self.answer
-        if second or self.elementary or self.grid == 0.0 or answer.routes is None or duals.stand_in > 1e-6:
+        if second or self.grid == 0.0 or answer.routes is None or duals.stand_in > 1e-6:
             return False
-        far = answer.value_bound - answer.value > FAR * max(self.grid, abs(answer.value))
+        far = answer.value_bound - answer.value > max(FAR * abs(answer.value), 1.5 * self.grid)
         return far and answer.value_bound <= rounded(-duals.objective, self.grid) + self.grid / 2
 
     def _price(self, duals: Duals, prize: FloatArray, rate: float, threshold: list[float], second: bool) -> bool:

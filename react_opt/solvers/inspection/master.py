@@ -141,6 +141,11 @@ class Master:
             self._solver.addRow(-highspy.kHighsInf, 1.0, len(index), columns, np.ones(len(index)))
         return len(found)
 
+    def ban(self, index: list[int]) -> None:
+        """Let columns, by number, be used no more."""
+        at = np.array(index, np.int32) + np.int32(len(self.sizes))
+        self._solver.changeColsBounds(len(at), at, np.zeros(len(at)), np.zeros(len(at)))
+
     def second_stage(self, least_value: float) -> None:
         """Minimise the second objective over plans of at least this value."""
         self.least_value = least_value

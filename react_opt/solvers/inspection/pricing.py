@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,8 @@ from react_opt.solvers.inspection.master import Column
 from react_opt.solvers.inspection.ngroutes import best_ng_routes
 
 ELEMENTARY_UP_TO = 40  # targets; above, routes remember a neighbourhood
-NEIGHBOURHOOD = 8
+NEIGHBOURHOOD = 5  # to begin with; it grows where the linear program uses cycles
+MOST_REMEMBERED = 14
 WORTH_NOTHING = 1e-9
 BEAM = 250  # labels per number of stops when routes are sought heuristically
 FIRST_LABELS = 4096  # room to begin with
@@ -133,7 +135,44 @@ class Pricer:
     def _neighbourhoods(self) -> NDArray[np.uint64]:
         drives = self.arrays.time_s[self.robot, : self.n, : self.n]
         near = np.argsort(drives.T - 1e18 * np.eye(self.n), axis=1, kind="stable")
-        return _bits(near[:, :NEIGHBOURHOOD].tolist(), self.words)
+        self._remembered = [set(row) for row in near[:, :NEIGHBOURHOOD].tolist()]
+        return _bits([sorted(row) for row in self._remembered], self.words)
+
+    def allows(self, stops: Sequence[int]) -> bool:
+        """Whether the memories, as they have grown, allow a route."""
+        if self.elementary or len(set(stops)) == len(stops):
+            return len(set(stops)) == len(stops)
+        known: set[int] = set()
+        for k in stops:
+            if k in known:
+                return False
+            known = known & self._remembered[k] | {k}
+        return True
+
+    def grow(self, stops: Sequence[int]) -> bool:
+        """Let memories grow until they forbid a route's shortest cycle (Roberti and Mingozzi 2014); whether they did.
+
+        Parameters
+        ----------
+        stops
+            A route that visits some target twice.
+        """
+        if self.elementary:
+            return False
+        last: dict[int, int] = {}
+        cycles = []
+        for at, k in enumerate(stops):
+            if k in last:
+                cycles.append((at - last[k], last[k], at))
+            last[k] = at
+        for _, first, again in sorted(cycles):
+            between, k = stops[first + 1 : again], stops[first]
+            if all(k in self._remembered[j] or len(self._remembered[j]) < MOST_REMEMBERED for j in between):
+                for j in between:
+                    self._remembered[j].add(k)
+                self.memory = _bits([sorted(row) for row in self._remembered], self.words)
+                return True
+        return False
 
     def price(
         self,
