@@ -18,6 +18,7 @@ from react_opt.solvers.watchdog import supervise
 __all__ = ["HighsBackend", "to_highs", "write_model"]
 
 FloatArray = NDArray[np.float64]
+ROUNDING = 1e-10  # of sums of a hundred terms or so, relative to the largest
 _Status = highspy.HighsModelStatus
 _LIMITS: dict[Any, Limit] = {
     _Status.kTimeLimit: "time",
@@ -53,7 +54,7 @@ class HighsBackend:
 def _run(program: Program, request: Request, watch: Watch) -> Claim:
     mixed = bool(program.integer.any())
     highs = to_highs(program, names=False)
-    settings = _settings(request, mixed)
+    settings = _settings(request, program)
     for name, value in settings.items():
         highs.setOptionValue(name, value)
     if watch.stopped():
@@ -88,17 +89,21 @@ def _run(program: Program, request: Request, watch: Watch) -> Claim:
         highspy.Highs.resetGlobalScheduler(False)  # the scheduler belongs to this thread
 
 
-def _settings(request: Request, mixed: bool) -> dict[str, Any]:
+def _settings(request: Request, program: Program) -> dict[str, Any]:
+    mixed = bool(program.integer.any())
+    # HiGHS cuts nodes off at "best + one unit + tolerance": below the rounding of large objectives it cuts off optima.
+    largest = float(np.abs(program.cost).max(initial=0.0))
+    tolerance = min(1e-6, max(TOLERANCE, ROUNDING * largest))
     settings: dict[str, Any] = {
         "threads": request.threads,
         "random_seed": request.seed,
-        "primal_feasibility_tolerance": TOLERANCE,
+        "primal_feasibility_tolerance": tolerance,
     }
     if mixed:
         settings |= {
             "mip_rel_gap": request.gap_rel,
             "mip_abs_gap": request.gap_abs,
-            "mip_feasibility_tolerance": TOLERANCE,
+            "mip_feasibility_tolerance": tolerance,
         }
     if request.work_limit is not None:
         settings["mip_max_nodes" if mixed else "simplex_iteration_limit"] = request.work_limit

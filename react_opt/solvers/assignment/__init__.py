@@ -22,19 +22,20 @@ from react_opt.models.assignment import (
 )
 from react_opt.options import SolveOptions
 from react_opt.plan import Assigned, AssignmentPlan, Claim, Deferred, Plan, gap_of
-from react_opt.solvers.assignment.exact import Assignment, assign, solve_arrays
+from react_opt.solvers.assignment.exact import Assignment, assign, solve_arrays, value_step
 from react_opt.solvers.assignment.explain import Reason, reasons, with_losses
 
 __all__ = ["Assignment", "assign", "solve_assignment"]
 
-TREE_S = 3.0  # how long the tree may take before a backend's cutting planes take over
+CLOSED_GAP = 1e-9
+TREE_S = 1.0  # how long the tree may take before a backend's cutting planes take over
 
 
 def solve_assignment(instance: AssignmentInstance, options: SolveOptions, start: Plan | None = None) -> AssignmentPlan:
     """Solve an ``assignment`` instance; see :func:`react_opt.solve`.
 
     The plain case is a linear assignment problem (scipy). Else a branch and bound of its own solves it; after
-    three seconds the monolith takes over (``method="auto"`` without a work limit). The unit of ``work_limit``
+    one second the monolith takes over (``method="auto"`` without a work limit). The unit of ``work_limit``
     is one relaxation solved.
 
     Raises
@@ -57,7 +58,9 @@ def solve_assignment(instance: AssignmentInstance, options: SolveOptions, start:
         answer, facts = _own(model, options, known)
     wall_s["solve"] = time.perf_counter() - begun
     begun = time.perf_counter()
-    optimal = answer.bound - answer.objective <= OPTIMAL_GAP * abs(answer.objective)
+    # A search that was stopped proves no more than it says: large gains would hide whole units in a relative gap.
+    allowed = OPTIMAL_GAP if answer.limit == "none" else CLOSED_GAP
+    optimal = answer.bound - answer.objective <= allowed * abs(answer.objective)
     if options.explain and optimal:
         why = with_losses(model, answer.robot_of, answer.objective, options.deadline, options.should_stop)
     else:
@@ -174,7 +177,9 @@ def _monolith(
             robot_of = found
     objective = objective_of(model.arrays, robot_of)
     trivial = float(np.maximum(model.arrays.value, 0.0).max(axis=0, initial=0.0).sum())
-    bound = max(objective, min(trivial, outcome.bound if outcome.bound is not None else trivial))
+    bound = min(trivial, outcome.bound if outcome.bound is not None else trivial)
+    step = value_step(mathematics.cost)
+    bound = max(objective, float(np.floor(bound / step + 1e-6)) * step if step > 0 else bound)
     facts = {
         "method": f"monolith: {why}",
         "solver": outcome.solver,

@@ -127,6 +127,14 @@ def linear_assignment(value: FloatArray) -> IntArray:
     return answer
 
 
+def value_step(value: FloatArray) -> float:
+    """Return the step of which all values are multiples where they are whole numbers, else 0."""
+    whole = np.rint(value)
+    if not len(value) or np.abs(whole).max() > 2**53 or not (whole == value).all():
+        return 0.0
+    return float(np.gcd.reduce(whole.astype(np.int64)))
+
+
 def _branch(
     arrays: AssignmentArrays,
     deadline: float | None,
@@ -147,7 +155,8 @@ def _branch(
         best_value, best[:] = objective_of(arrays, start), -1
         kept = np.flatnonzero(start[pairs.target] == pairs.robot)
         best[pairs.target[kept]] = kept
-    scale = float(pairs.value.max()) if n_pairs else 0.0
+    step = value_step(pairs.value)
+    tolerance = max(TOLERANCE * float(pairs.value.max(initial=0.0)), 0.999 * step)  # what is better is so by a step
     limit: Limit = "none"
     chunk = FIRST_CHUNK
     while counters[2] != DONE:
@@ -167,7 +176,7 @@ def _branch(
         best_value = search(
             pairs.start, pairs.robot, pairs.target, pairs.value, pairs.energy, pairs.order, pairs.units,
             pairs.clique_start, pairs.clique, pairs.near_start, pairs.near, states, prices, bounds, counters, best,
-            best_value, chunk, gap, TOLERANCE * scale,
+            best_value, chunk, gap, tolerance,
         )  # fmt: skip
         if counters[2] == STACK_FULL:
             states, prices = np.concatenate([states, states]), np.concatenate([prices, prices])
@@ -183,6 +192,8 @@ def _branch(
     bound = max([objective, float(bounds[-1]), *bounds[: counters[0]].tolist()])
     if not np.isfinite(bound):
         bound = float(arrays.value.max(axis=0, initial=0.0).sum())
+    if step > 0:
+        bound = max(objective, float(np.floor(bound / step + 1e-6)) * step)
     if gap == 0.0 and limit == "none":
         bound = objective
     return Assignment(robot_of, objective, bound, limit, int(counters[1]), False)
