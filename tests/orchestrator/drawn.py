@@ -28,7 +28,7 @@ PROFILE = RobotProfile(
 
 def drawn(text: str, pixels_per_char: int = 2) -> np.ndarray[Any, Any]:
     """Return the pixels of a drawing: ``#`` is a wall, everything else free; the last line has the smallest y."""
-    lines = [line for line in text.strip("\n").split("\n")][::-1]
+    lines = text.strip("\n").split("\n")[::-1]
     width = max(map(len, lines))
     grid = np.array([[OCCUPIED if ch == "#" else FREE for ch in line.ljust(width, "#")] for line in lines], np.uint8)
     return np.kron(grid, np.ones((pixels_per_char, pixels_per_char), np.uint8))
@@ -93,7 +93,7 @@ class DrawnBelief:
                     at = np.argwhere(labels[b * side : (b + 1) * side, a * side : (a + 1) * side] == name)
                     if not len(at):
                         continue
-                    at = at + (b * side, a * side)
+                    at += (b * side, a * side)
                     edge = at[border[at[:, 0], at[:, 1]]]
                     if not len(edge):
                         continue

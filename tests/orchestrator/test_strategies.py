@@ -47,5 +47,5 @@ def test_decides_the_same_twice(name: str) -> None:
 
 
 def test_an_unknown_strategy_is_named_with_those_there_are() -> None:
-    with pytest.raises(UsageError, match="expected one of oros, react, .* found 'raect'"):
+    with pytest.raises(UsageError, match=r"expected one of oros, react, .* found 'raect'"):
         make_strategy("raect", OPTIONS)
