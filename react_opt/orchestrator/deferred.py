@@ -6,9 +6,9 @@ import numpy as np
 
 from react_opt.instance import InspectionInstance, InspectionRobot, InspectionTarget, InspectionTravel
 from react_opt.orchestrator.belief import Belief, LocalTarget, RobotView
-from react_opt.orchestrator.highlevel import distance_m
-from react_opt.orchestrator.orders import drive, stand
+from react_opt.orchestrator.orders import Driver, distance_m
 from react_opt.orchestrator.strategy import Note, Order, StrategyOptions
+from react_opt.orchestrator.survey import Survey
 from react_opt.plan import InspectionPlan
 from react_opt.planner import solve
 from react_opt.solvers.inspection import gate
@@ -25,15 +25,15 @@ class Inspection:
     vanish (seen in passing).
     """
 
-    def __init__(self, options: StrategyOptions) -> None:
+    def __init__(self, options: StrategyOptions, driver: Driver) -> None:
         self.options = options
+        self.driver = driver
         self.routes: dict[str, list[str]] = {}
         self.goals: dict[str, str] = {}
-        self.goal_m: dict[str, tuple[float, float]] = {}
         self.given_up: set[str] = set()
 
     def step(
-        self, belief: Belief, robots: list[RobotView], explored: set[str], notes: list[Note]
+        self, belief: Belief, survey: Survey, robots: list[RobotView], notes: list[Note]
     ) -> tuple[list[Order], bool]:
         """Return the orders that change, and whether the inspection is over."""
         known = {target.id: target for target in belief.targets if target.stand_m is not None}
@@ -41,7 +41,8 @@ class Inspection:
             goal = self.goals.get(robot.id)
             at_goal = goal in known and robot.state in ("idle", "stuck")
             if at_goal and goal is not None:
-                near = distance_m(robot, self.goal_m[robot.id]) <= SEEN_M
+                goal_m = self.driver.goal(robot)
+                near = goal_m is not None and distance_m(robot, goal_m) <= SEEN_M
                 why = "still unknown from where it should be seen" if near else "no progress"
                 notes.append(Note("target_abandoned", robot=robot.id, target=goal, reason=why))
                 self.given_up.add(goal)
@@ -53,32 +54,29 @@ class Inspection:
         planned = {target for route in self.routes.values() for target in route} | set(self.goals.values())
         free = [robot for robot in robots if robot.id not in self.goals and not self.routes.get(robot.id)]
         if free and set(left) - planned:
-            self._plan(belief, robots, left, explored, notes)
-        orders = [self._follow(belief, robot, left) for robot in robots]
+            self._plan(belief, robots, left, notes)
+        orders = [order for robot in robots for order in self._follow(belief, survey, robot, left)]
         over = not self.goals and not any(self.routes.values())
-        return [order for order in orders if order is not None], over
+        return orders, over
 
-    def _follow(self, belief: Belief, robot: RobotView, left: dict[str, LocalTarget]) -> Order | None:
+    def _follow(self, belief: Belief, survey: Survey, robot: RobotView, left: dict[str, LocalTarget]) -> list[Order]:
         route = self.routes.get(robot.id, [])
-        while robot.id not in self.goals and route:
-            target = left[route.pop(0)]
+        while robot.id in self.goals or route:
+            target = left[self.goals[robot.id] if robot.id in self.goals else route.pop(0)]
             assert target.stand_m is not None
-            order = drive(belief, robot, target.stand_m, target.id, optimistic=False)
-            if order is None:
-                self.given_up.add(target.id)
-                continue
-            self.goals[robot.id], self.goal_m[robot.id] = target.id, target.stand_m
-            return order
-        if robot.id not in self.goals and robot.target is not None:
-            return stand(robot)
-        return None
+            orders = self.driver.go(belief, survey, robot, target.stand_m, target.id)
+            if orders is not None:
+                self.goals[robot.id] = target.id
+                return orders
+            self.given_up.add(target.id)
+            self.goals.pop(robot.id, None)
+        return self.driver.stop(robot)
 
     def _plan(
         self,
         belief: Belief,
         robots: list[RobotView],
         left: dict[str, LocalTarget],
-        explored: set[str],
         notes: list[Note],
     ) -> None:
         targets = sorted(left.values(), key=lambda target: (-target.size_m2, target.id))[:MOST_TARGETS]
@@ -131,8 +129,8 @@ def solve_inspection_now(
             InspectionRobot(
                 id=robot.id,
                 at=f"at {robot.id}",
-                battery_j=robot.battery_j,
-                reserve_j=min(robot.profile.reserve_j, robot.battery_j),
+                battery_j=max(0.0, robot.battery_j),
+                reserve_j=max(0.0, min(robot.profile.reserve_j, robot.battery_j)),
             )
             for robot in robots
         ),

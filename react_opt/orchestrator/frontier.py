@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
-from react_opt.orchestrator.highlevel import distance_m
-from react_opt.orchestrator.orders import able, drive, stand
+from react_opt.orchestrator.orders import Driver, able, distance_m
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
 from react_opt.orchestrator.survey import Cluster, Survey
 
 SHORTEST_M = 0.4  # shorter frontiers are noise: a robot is wider
 RECONSIDER_S = 3.0  # explore_lite's planner_frequency is 0.33 Hz
 SAME_M = 2.0  # a frontier that moved less is the same one
+STAND_BLOCKS = 6  # so many coarse blocks away from a frontier a place to stand is looked for
 SEEN_M = 0.5  # a frontier that is still there when a robot stands at it so near is given up
 
 
@@ -54,7 +54,9 @@ class Frontiers:
     def __init__(self, options: StrategyOptions) -> None:
         self.options = options
         self.survey: Survey | None = None
+        self.driver = Driver()
         self.goal_m: dict[str, tuple[float, float]] = {}
+        self.names: dict[str, str] = {}
         self.serial = 0
         self.given_up: list[tuple[float, float]] = []
         self.last_s = -np.inf
@@ -74,39 +76,43 @@ class Frontiers:
             self._drop_goal(robot, clusters)
         self.goal_m = {name: at for name, at in self.goal_m.items() if name in {robot.id for robot in robots}}
         waits = [robot for robot in robots if robot.id not in self.goal_m]
-        if not waits and belief.t_s < self.last_s + RECONSIDER_S:
-            return Decision()
-        self.last_s = belief.t_s
-        if not clusters:
-            return self._finish(robots)
-        choice = self._choice(belief, robots, clusters)
-        orders: list[Order] = []
         notes: list[Note] = []
-        for robot, picked in zip(robots, self.choose(choice), strict=True):
-            if picked < 0:
-                self.goal_m.pop(robot.id, None)
-                if robot.target is not None:
-                    orders.append(stand(robot))
-                continue
-            cluster = clusters[picked]
-            at = (cluster.x_m, cluster.y_m)
-            known = self.goal_m.get(robot.id)
-            if known is not None and np.hypot(known[0] - at[0], known[1] - at[1]) < SAME_M and robot.state == "driving":
-                continue
-            self.serial += 1
-            order = drive(belief, robot, self._stand(cluster), f"frontier {self.serial}")
-            if order is None:
-                self.given_up.append(at)
-                continue
-            self.goal_m[robot.id] = at
-            orders.append(order)
-            why = f"{cluster.length_m:.1f} m of frontier"
-            notes.append(Note("target_taken", robot=robot.id, target=order.target, reason=why, x_m=at[0], y_m=at[1]))
+        if clusters and (waits or belief.t_s >= self.last_s + RECONSIDER_S):
+            self.last_s = belief.t_s
+            choice = self._choice(belief, robots, clusters)
+            for robot, picked in zip(robots, self.choose(choice), strict=True):
+                self._take(robot, clusters[picked] if picked >= 0 else None, notes)
+        orders: list[Order] = []
+        for robot in robots:
+            orders += self._orders(belief, robot)
         return Decision(orders, notes, done=not self.goal_m)
 
-    def _finish(self, robots: list[RobotView]) -> Decision:
-        self.goal_m.clear()
-        return Decision([stand(robot) for robot in robots if robot.target is not None], done=True)
+    def _take(self, robot: RobotView, cluster: Cluster | None, notes: list[Note]) -> None:
+        if cluster is None:
+            self.goal_m.pop(robot.id, None)
+            return
+        at = (cluster.x_m, cluster.y_m)
+        before = self.goal_m.get(robot.id)
+        if before is not None and np.hypot(before[0] - at[0], before[1] - at[1]) < SAME_M:
+            return
+        self.serial += 1
+        self.goal_m[robot.id], self.names[robot.id] = at, f"frontier {self.serial}"
+        why = f"{cluster.length_m:.1f} m of frontier"
+        notes.append(
+            Note("target_taken", robot=robot.id, target=self.names[robot.id], reason=why, x_m=at[0], y_m=at[1])
+        )
+
+    def _orders(self, belief: Belief, robot: RobotView) -> list[Order]:
+        assert self.survey is not None
+        at = self.goal_m.get(robot.id)
+        if at is None:
+            return self.driver.stop(robot)
+        orders = self.driver.go(belief, self.survey, robot, self._stand(*at), self.names[robot.id])
+        if orders is None:
+            self.given_up.append(at)
+            del self.goal_m[robot.id]
+            return self.driver.stop(robot)
+        return orders
 
     def _clusters(self, robots: Sequence[RobotView]) -> list[Cluster]:
         """Return the frontiers that some robot reaches and nobody has given up."""
@@ -118,22 +124,16 @@ class Frontiers:
             cluster
             for cluster in self.survey.clusters(SHORTEST_M)
             if not any(np.hypot(x - cluster.x_m, y - cluster.y_m) < SEEN_M for x, y in self.given_up)
-            and np.isfinite(times[self.survey.block_of(*self._stand(cluster))])
+            and np.isfinite(times[self.survey.block_of(*self._stand(cluster.x_m, cluster.y_m))])
         ]
 
-    def _stand(self, cluster: Cluster) -> tuple[float, float]:
+    def _stand(self, x_m: float, y_m: float) -> tuple[float, float]:
         """Return where to drive to for a frontier: the drivable block nearest to its middle."""
         assert self.survey is not None
-        row, col = self.survey.block_of(cluster.x_m, cluster.y_m)
-        reach = 6
-        low_row, low_col = max(0, row - reach), max(0, col - reach)
-        for passable in (self.survey.known, self.survey.may):
-            window = np.argwhere(passable[low_row : row + reach + 1, low_col : col + reach + 1])
-            if len(window):
-                squares = (window[:, 0] + low_row - row) ** 2 + (window[:, 1] + low_col - col) ** 2
-                best = window[int(np.argmin(squares))]
-                return self.survey.point_of((int(best[0]) + low_row, int(best[1]) + low_col))
-        return cluster.x_m, cluster.y_m
+        block = self.survey.block_of(x_m, y_m)
+        near = self.survey.nearest_block(block, self.survey.known, STAND_BLOCKS)
+        near = near or self.survey.nearest_block(block, self.survey.may, STAND_BLOCKS)
+        return (x_m, y_m) if near is None else self.survey.point_of(near)
 
     def _drop_goal(self, robot: RobotView, clusters: Sequence[Cluster]) -> None:
         """Forget a goal that has been reached or seen, and give up one that stays unknown though reached."""
@@ -150,7 +150,7 @@ class Frontiers:
 
     def _choice(self, belief: Belief, robots: list[RobotView], clusters: list[Cluster]) -> Choice:
         assert self.survey is not None
-        blocks = [self.survey.block_of(*self._stand(cluster)) for cluster in clusters]
+        blocks = [self.survey.block_of(*self._stand(cluster.x_m, cluster.y_m)) for cluster in clusters]
         time_s, energy_j = np.empty((2, len(robots), len(clusters)))
         for row, robot in enumerate(robots):
             times = self.survey.times_from(robot.x_m, robot.y_m, optimistic=True)
@@ -166,6 +166,6 @@ class Frontiers:
         if not left:
             return np.zeros(len(clusters))
         assert self.survey is not None
-        blocks = np.array([self.survey.block_of(*self._stand(cluster)) for cluster in clusters])
+        blocks = np.array([self.survey.block_of(*self._stand(cluster.x_m, cluster.y_m)) for cluster in clusters])
         each = [self.survey.times_from(*area.stand_m, optimistic=True)[blocks[:, 0], blocks[:, 1]] for area in left]
         return np.asarray(np.min(each, axis=0), dtype=np.float64)

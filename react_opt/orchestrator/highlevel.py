@@ -8,19 +8,22 @@ no arc of its own.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import ceil, hypot
+from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
+from react_opt.geometry.occupancy import UNKNOWN, OccupancyMap
 from react_opt.instance import Cell, OrosInstance, OrosRobot, TravelArc
 from react_opt.orchestrator.belief import AreaView, Belief, FloatArray, RobotView
 from react_opt.orchestrator.strategy import Note, Point, StrategyOptions
+from react_opt.orchestrator.survey import Survey
 from react_opt.plan import OrosPlan
 from react_opt.planner import solve
 
 WORK_LIMIT = 4000  # of one high-level solve: counted, so that the same mission gives the same plan
 VIA = 1.1  # a way through another area that is at most so much longer stands for the direct one
+NEAR_BLOCKS = 10  # an area is left from the drivable block nearest to its middle, at most so many away
 IDLE_S = 1e-6
 
 
@@ -57,16 +60,25 @@ def area_at(belief: Belief, point: Point) -> AreaView:
     return min(belief.areas, key=lambda area: max(abs(area.x_m - point[0]), abs(area.y_m - point[1])))
 
 
-def area_times(belief: Belief, robot: RobotView, areas: Sequence[AreaView]) -> tuple[FloatArray, FloatArray]:
-    """Return time (s) and energy (J) between the standing points of areas as ``(n, n)``, NaN where a wall is proven."""
-    points = np.array([area.stand_m for area in areas], dtype=np.float64).reshape(-1, 2)
-    time_s, energy_j = np.zeros((2, len(areas), len(areas)))
+def goal_of(source: OccupancyMap, area: AreaView) -> Point:
+    """Return where to drive to in an area: its centre while nobody knows what is there, then its standing point."""
+    centre = (area.x_m, area.y_m)
+    unknown = int(source.values_at(np.array(centre))) == UNKNOWN
+    return centre if unknown and not area.unreachable else area.stand_m
+
+
+def area_times(survey: Survey, areas: Sequence[AreaView]) -> FloatArray:
+    """Return time (s) between where areas are driven to as ``(n, n)``, NaN where walls are known all around."""
+    points = [goal_of(survey.map, area) for area in areas]
+    blocks = [survey.nearest_block(survey.block_of(*point), survey.may, NEAR_BLOCKS) for point in points]
+    time_s = np.full((len(areas), len(areas)), np.nan)
     for row, point in enumerate(points):
-        there = replace(robot, x_m=float(point[0]), y_m=float(point[1]))
-        time_s[row], energy_j[row] = belief.costs(there, points, optimistic=True)
+        if blocks[row] is not None:
+            field = survey.times_from(*point, optimistic=True)
+            time_s[row] = [np.nan if block is None else field[block] for block in blocks]
+    time_s[~np.isfinite(time_s)] = np.nan
     np.fill_diagonal(time_s, 0.0)
-    np.fill_diagonal(energy_j, 0.0)
-    return (time_s + time_s.T) / 2, (energy_j + energy_j.T) / 2
+    return np.asarray((time_s + time_s.T) / 2)
 
 
 def direct_pairs(time_s: FloatArray, beside: FloatArray) -> list[tuple[int, int]]:
@@ -110,6 +122,7 @@ def neighbours(areas: Sequence[AreaView]) -> FloatArray:
 
 def high_level(
     belief: Belief,
+    survey: Survey,
     options: StrategyOptions,
     places: Sequence[Place],
     explored: frozenset[str],
@@ -118,8 +131,8 @@ def high_level(
 
     Parameters
     ----------
-    belief, options
-        What is known, and the step, horizon and window.
+    belief, survey, options
+        What is known, its map's survey, and the step, horizon and window.
     places
         The robots that take part. A busy robot enters with the area it is on its way to as its start and the steps
         until it is there, rounded up. One that cannot even idle through the window is left out.
@@ -140,7 +153,7 @@ def high_level(
         return HighLevelPlan({}, {}, Note("replan", reason="OROS: no robot can take part for a step of the window"))
     starts = {place.area for place in taking_part}
     areas = [area for area in belief.areas if not area.unreachable or area.id in starts]
-    instance = _instance(belief, options, taking_part, areas, explored, window)
+    instance = _instance(survey, options, taking_part, areas, explored, window)
     plan: OrosPlan = solve(instance, time_limit_s=None, work_limit=WORK_LIMIT, threads=1, seed=0, explain=False)
     claim = plan.claim.model_copy(update={"certificate": None, "wall_s": {}})
     routes = {robot.id: _route(robot.steps) for robot in plan.robots}
@@ -165,7 +178,7 @@ def _route(steps: Sequence[object]) -> tuple[str, ...]:
 
 
 def _instance(
-    belief: Belief,
+    survey: Survey,
     options: StrategyOptions,
     places: Sequence[Place],
     areas: Sequence[AreaView],
@@ -174,15 +187,14 @@ def _instance(
 ) -> OrosInstance:
     step_s = options.step_s
     slowest = min((place.robot for place in places), key=lambda robot: robot.profile.speed_max_m_s)
-    time_s, energy_j = area_times(belief, slowest, areas)
+    time_s = area_times(survey, areas)
     travel = []
     for i, j in direct_pairs(time_s, neighbours(areas)):
-        steps = max(1, ceil(float(time_s[i, j]) / step_s - 1e-9))
-        rest_j = slowest.profile.idle_w * (steps * step_s - float(time_s[i, j]))
+        drive_s = float(time_s[i, j])
+        steps = max(1, ceil(drive_s / step_s - 1e-9))
+        energy_j = slowest.profile.motion_w * drive_s + slowest.profile.idle_w * steps * step_s
         travel.append(
-            TravelArc.model_validate(
-                {"from": areas[i].id, "to": areas[j].id, "steps": steps, "energy_j": float(energy_j[i, j]) + rest_j}
-            )
+            TravelArc.model_validate({"from": areas[i].id, "to": areas[j].id, "steps": steps, "energy_j": energy_j})
         )
     robots = []
     for place in places:
@@ -217,8 +229,3 @@ def _instance(
         travel=tuple(travel),
         robots=tuple(robots),
     )
-
-
-def distance_m(robot: RobotView, point: Point) -> float:
-    """Return the straight distance from a robot to a point, m."""
-    return hypot(robot.x_m - point[0], robot.y_m - point[1])

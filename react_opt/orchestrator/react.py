@@ -16,7 +16,7 @@ The algorithm's lines, as they are named in the comments below:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,10 +30,11 @@ from react_opt.instance import (
 from react_opt.models.priorities import is_postponed
 from react_opt.orchestrator.belief import AreaView, Belief, LocalTarget, RobotView
 from react_opt.orchestrator.deferred import Inspection
-from react_opt.orchestrator.highlevel import Place, area_at, distance_m, high_level
-from react_opt.orchestrator.orders import able, drive, stand
+from react_opt.orchestrator.highlevel import Place, area_at, goal_of, high_level
+from react_opt.orchestrator.orders import Driver, able, distance_m
 from react_opt.orchestrator.priority import priorities
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
+from react_opt.orchestrator.survey import Survey
 from react_opt.plan import AssignmentPlan
 from react_opt.planner import solve
 
@@ -52,8 +53,6 @@ class RobotState:
     area: str | None = None
     entered: bool = False
     goal: str | None = None
-    goal_m: tuple[float, float] = (0.0, 0.0)
-    route: tuple[str, ...] = field(default=())
 
 
 class React:
@@ -69,11 +68,16 @@ class React:
         self.postponed: set[str] = set()
         self.state: dict[str, RobotState] = {}
         self.inspection: Inspection | None = None
+        self.driver = Driver()
+        self.survey: Survey | None = None
         self.begun = False
 
     def decide(self, belief: Belief) -> Decision:
         """Return what changes now; called at every map update (line 2)."""
         notes: list[Note] = []
+        if self.survey is None:
+            self.survey = Survey([robot.profile for robot in belief.robots])
+        self.survey.update(belief.map, belief.version)
         areas = {area.id: area for area in belief.areas}
         robots = able(belief)
         lost = [name for name in self.state if name not in {robot.id for robot in robots}]
@@ -95,8 +99,8 @@ class React:
             return self._inspect(belief, robots, notes)  # line 10
         self.inspection = None
         chosen = self._assign(active, open_targets, costs, notes)  # line 5
-        orders = [self._move(belief, robot, areas, chosen) for robot in robots]  # line 6
-        return Decision([order for order in orders if order is not None], notes)
+        orders = [order for robot in robots for order in self._move(belief, robot, areas, chosen)]  # line 6
+        return Decision(orders, notes)
 
     # --- targets ---
 
@@ -112,7 +116,8 @@ class React:
             state = self.state[robot.id]
             if state.goal is None or state.goal not in known:
                 continue
-            there = distance_m(robot, state.goal_m) <= SEEN_M and robot.state == "idle"
+            goal_m = self.driver.goal(robot)
+            there = robot.state == "idle" and goal_m is not None and distance_m(robot, goal_m) <= SEEN_M
             if there or robot.state == "stuck":
                 why = "still unknown from where it should be seen" if there else "no progress"
                 notes.append(Note("target_abandoned", robot=robot.id, target=state.goal, reason=why))
@@ -176,7 +181,8 @@ class React:
             state = self.state[robot.id]
             if state.area != area.id:
                 continue
-            arrived = distance_m(robot, area.stand_m) <= ARRIVED_M
+            assert self.survey is not None
+            arrived = distance_m(robot, goal_of(self.survey.map, area)) <= ARRIVED_M
             state.entered |= arrived
             ended = state.entered or (robot.state in ("idle", "stuck") and robot.target == area.id)
             nothing = ended and not costs[robot.id]
@@ -199,6 +205,7 @@ class React:
         notes: list[Note],
     ) -> None:
         """Plan areas anew and send the free robots to their next ones; busy robots keep theirs."""
+        assert self.survey is not None
         places = []
         for robot in robots:
             area = self.state[robot.id].area
@@ -209,7 +216,7 @@ class React:
             time_s, _ = belief.costs(robot, np.array([areas[area].stand_m]), optimistic=True)
             until_s = 0.0 if np.isnan(time_s[0]) or self.state[robot.id].entered else float(time_s[0])
             places.append(Place(robot, area, max([until_s, *(t for t, _ in reached)])))
-        plan = high_level(belief, self.options, places, frozenset(self.explored))
+        plan = high_level(belief, self.survey, self.options, places, frozenset(self.explored))
         notes.append(plan.note)
         for place in places:
             name = place.robot.id
@@ -248,8 +255,8 @@ class React:
             name="local targets",
             robots=tuple(
                 AssignmentRobot(
-                    id=robot.id, battery_j=robot.battery_j,
-                    reserve_j=min(robot.profile.reserve_j, robot.battery_j), zone=tuple(costs[robot.id]),
+                    id=robot.id, battery_j=max(0.0, robot.battery_j),
+                    reserve_j=max(0.0, min(robot.profile.reserve_j, robot.battery_j)), zone=tuple(costs[robot.id]),
                 )
                 for robot in robots
             ),
@@ -273,30 +280,29 @@ class React:
 
     def _move(
         self, belief: Belief, robot: RobotView, areas: dict[str, AreaView], chosen: dict[str, LocalTarget]
-    ) -> Order | None:
-        """Send a robot to its local target, or to its area's standing point while it has none (line 6)."""
+    ) -> list[Order]:
+        """Send a robot to its local target, or to its area while it has none (line 6)."""
+        assert self.survey is not None
         state = self.state[robot.id]
         if state.area is None:
             state.goal = None
-            return stand(robot) if robot.target is not None or robot.state != "idle" else None
+            return self.driver.stop(robot)
         target = chosen.get(robot.id)
         if target is not None and target.stand_m is not None:
-            goal, goal_m = target.id, target.stand_m
+            state.goal, goal_m = target.id, target.stand_m
         else:
-            goal, goal_m = state.area, areas[state.area].stand_m
-        moved = np.hypot(goal_m[0] - state.goal_m[0], goal_m[1] - state.goal_m[1]) > MOVED_M
-        if goal == state.goal and not moved and robot.state not in ("idle", "stuck"):
-            return None
-        order = drive(belief, robot, goal_m, goal)
-        if order is None:
-            return stand(robot)
-        state.goal, state.goal_m = goal, goal_m
-        return order
+            state.goal, goal_m = state.area, goal_of(self.survey.map, areas[state.area])
+        orders = self.driver.go(belief, self.survey, robot, goal_m, state.goal)
+        if orders is None:
+            state.entered |= state.goal == state.area  # it gets no nearer
+            return self.driver.stop(robot)
+        return orders
 
     # --- the deferred-priority inspection ---
 
     def _inspect(self, belief: Belief, robots: list[RobotView], notes: list[Note]) -> Decision:
         if self.inspection is None:
-            self.inspection = Inspection(self.options)
-        orders, done = self.inspection.step(belief, robots, self.explored, notes)
+            self.inspection = Inspection(self.options, self.driver)
+        assert self.survey is not None
+        orders, done = self.inspection.step(belief, self.survey, robots, notes)
         return Decision(orders, notes, done)

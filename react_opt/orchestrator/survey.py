@@ -1,39 +1,53 @@
 """What a belief's map says about driving and seeing, on blocks of pixels: fast enough to ask at every decision.
 
-A *block* is a square of pixels, about 0.25 m wide. A robot can drive in it where it holds a pixel at which nothing
-known blocks the footprint. Blocks are coarse for estimates only: the way that is driven comes from
-:meth:`react_opt.orchestrator.belief.Belief.path`, pixel by pixel.
+*Blocks* of 0.1 m say what is open, solid or hidden and how much clearance there is; *coarse blocks* of 0.2 m carry
+drive times. Both are for estimates and choices: the way that is driven comes from
+:meth:`react_opt.orchestrator.belief.Belief.path`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from react_opt.energy import RobotProfile
-from react_opt.geometry.occupancy import OccupancyMap
-from react_opt.orchestrator.survey_kernels import block_sums, drive_times, stamp_clearance, view_gain
+from react_opt.geometry.occupancy import OCCUPIED, OccupancyMap
+from react_opt.orchestrator.survey_kernels import (
+    coarse_blocks,
+    drive_times,
+    stamp_clearance,
+    survey_blocks,
+    view_gain,
+    way_is_free,
+)
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-BLOCK_M = 0.25
-UNKNOWN_SLOWER = 1.15
-"""Ways through unknown space are rarely straight: their time is taken to be so much longer."""
+Block = tuple[int, int]
+"""Row and column of a coarse block."""
+
+BLOCK_M = 0.1
+COARSE = 2
+HIDDEN_SLOWER = 1.15
+"""Ways through hidden space are rarely straight: their time is taken to be so much longer."""
+SLACK_M = 0.1
+"""A way counts as blocked where something known comes so much nearer than contact: blocks are not exact."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cluster:
-    """A piece of the border between known-free and unknown space.
+    """A piece of the frontier, where open blocks border hidden ones.
 
     Parameters
     ----------
     blocks
-        ``(k, 2)`` rows and columns of its blocks.
+        ``(k, 2)`` rows and columns of its coarse blocks.
     x_m, y_m
-        Centre of the block nearest to their mean, m.
+        Centre of the one nearest to their mean, m.
     length_m
         Length of the border, m.
     """
@@ -50,85 +64,98 @@ class Survey:
     Parameters
     ----------
     profiles
-        Of the robots: the widest footprint decides where any of them drives.
+        Of the robots: the widest footprint and the slowest speed count.
     """
 
-    def __init__(self, profiles: list[RobotProfile]) -> None:
+    def __init__(self, profiles: Sequence[RobotProfile]) -> None:
         self.radius_m = max(profile.radius_m for profile in profiles)
         self.profile = min(profiles, key=lambda profile: profile.speed_max_m_s)
-        self._cells: NDArray[np.uint8] | None = None
-        self._frame: tuple[float, ...] = ()
         self.version = -1
+        self._solid: NDArray[np.bool_] | None = None
+        self._frame: tuple[float, ...] = ()
 
     def update(self, source: OccupancyMap, version: int) -> None:
-        """Take over a map; only what became occupied since the last one costs time."""
+        """Take over a map."""
         if version == self.version:
             return
-        self.version = version
-        cells = source.cells
-        frame = (
-            source.resolution_m,
-            source.origin_x_m,
-            source.origin_y_m,
-            float(cells.shape[0]),
-            float(cells.shape[1]),
-        )
-        self.map = source
+        self.version, self.map = version, source
         res = source.resolution_m
-        self.block_px = max(1, round(BLOCK_M / res))
-        self.block_m = self.block_px * res
+        self.k = max(1, round(BLOCK_M / res))
+        self.block_m = self.k * res
+        self.coarse_m = COARSE * self.block_m
         reach_px = max(self.radius_m, self.profile.full_speed_clearance_m) / res
-        occupied = cells == 1
-        if frame != self._frame or self._cells is None or bool(((self._cells == 1) & ~occupied).any()):
+        solid = source.cells == OCCUPIED
+        self.blocks = survey_blocks(source.cells, self.k)
+        frame = (res, source.origin_x_m, source.origin_y_m, *map(float, source.cells.shape))
+        if frame != self._frame or self._solid is None or bool((self._solid & ~solid).any()):
             self._frame = frame
-            self._square = np.full(cells.shape, np.iinfo(np.int32).max, dtype=np.int32)
-            new = np.argwhere(occupied)
+            self._clear_px = np.full(self.blocks.shape, reach_px)
+            new = np.argwhere(solid)
         else:
-            new = np.argwhere(occupied & (self._cells != 1))
-        self._cells = cells.copy()
-        stamp_clearance(self._square, new, int(np.ceil(reach_px)))
-        contact = (self.radius_m / res) ** 2
-        self.known, self.may, clear_px, self.unknown, self.border, self.pixel = block_sums(
-            cells, self._square, contact, self.block_px
+            new = np.argwhere(solid & ~self._solid)
+        self._solid = solid
+        stamp_clearance(self._clear_px, new, self.k, reach_px)
+        self.known, self.may, clear_px, self.border, self.best = coarse_blocks(
+            self.blocks, self._clear_px, self.radius_m / res - 1e-6, COARSE
         )
-        speed = self.profile.speed_m_s(np.minimum(clear_px, reach_px) * res, self.radius_m)
-        self.slowness = np.where(self.known, 1.0, UNKNOWN_SLOWER) * self.block_m / speed
+        speed = self.profile.speed_m_s(clear_px * res, self.radius_m)
+        self.slowness = np.where(self.known, 1.0, HIDDEN_SLOWER) * self.coarse_m / speed
 
-    def block_of(self, x_m: float, y_m: float) -> tuple[int, int]:
-        """Return row and column of the block that a point lies in, the nearest one of the map."""
-        x, y = self.map.world_to_pixel((x_m, y_m))
+    # --- places ---
+
+    def to_blocks(self, points_m: ArrayLike) -> FloatArray:
+        """Return block coordinates (column, row) of world points, not rounded."""
+        return self.map.world_to_pixel(points_m) / self.k
+
+    def block_of(self, x_m: float, y_m: float) -> Block:
+        """Return the coarse block that a point lies in, the nearest one of the map."""
+        x, y = self.to_blocks((x_m, y_m)) / COARSE
         rows, cols = self.known.shape
-        return (
-            int(np.clip(y // self.block_px, 0, rows - 1)),
-            int(np.clip(x // self.block_px, 0, cols - 1)),
-        )
+        return int(np.clip(y, 0, rows - 1)), int(np.clip(x, 0, cols - 1))
 
-    def point_of(self, block: tuple[int, int]) -> tuple[float, float]:
-        """Return where in a block a robot has most clearance, m; its centre where it can nowhere drive."""
-        row, col = block
-        at = int(self.pixel[row, col])
+    def point_of(self, block: Block) -> tuple[float, float]:
+        """Return where in a coarse block a robot has most clearance, m; its centre where it cannot stand there."""
+        at = int(self.best[block])
         if at >= 0:
-            x, y = at % self.map.cols + 0.5, at // self.map.cols + 0.5
+            col, row = at % self.blocks.shape[1] + 0.5, at // self.blocks.shape[1] + 0.5
         else:
-            x, y = (col + 0.5) * self.block_px, (row + 0.5) * self.block_px
-        point = self.map.pixel_to_world((x, y))
+            col, row = (block[1] + 0.5) * COARSE, (block[0] + 0.5) * COARSE
+        point = self.map.pixel_to_world((col * self.k, row * self.k))
         return float(point[0]), float(point[1])
 
+    def nearest_block(self, block: Block, passable: NDArray[np.bool_], reach: int) -> Block | None:
+        """Return the passable coarse block nearest to one, within a number of rows and columns, None for none."""
+        low_row, low_col = max(0, block[0] - reach), max(0, block[1] - reach)
+        window = np.argwhere(passable[low_row : block[0] + reach + 1, low_col : block[1] + reach + 1])
+        if len(window) == 0:
+            return None
+        gap = (window[:, 0] + low_row - block[0]) ** 2 + (window[:, 1] + low_col - block[1]) ** 2
+        row, col = window[int(np.argmin(gap))]
+        return int(row) + low_row, int(col) + low_col
+
+    # --- driving ---
+
     def times_from(self, x_m: float, y_m: float, *, optimistic: bool) -> FloatArray:
-        """Return ``(rows, cols)`` s to drive from a point to every block, infinite where there is no way.
+        """Return ``(rows, cols)`` s to drive from a point to every coarse block, infinite where there is no way.
 
         Over known-free blocks only, unless ``optimistic``. A point that lies in no such block starts from the
         nearest one.
         """
         passable = self.may if optimistic else self.known
-        row, col = self.block_of(x_m, y_m)
-        if not passable[row, col]:
-            rows, cols = np.nonzero(passable)
-            if len(rows) == 0:
+        block = self.block_of(x_m, y_m)
+        if not passable[block]:
+            near = self.nearest_block(block, passable, 10)
+            if near is None:
                 return np.full(passable.shape, np.inf)
-            nearest = int(np.argmin((rows - row) ** 2 + (cols - col) ** 2))
-            row, col = int(rows[nearest]), int(cols[nearest])
-        return drive_times(passable, self.slowness, row, col)
+            block = near
+        return drive_times(passable, self.slowness, block[0], block[1])
+
+    def is_free(self, way_m: ArrayLike) -> bool:
+        """Tell whether nothing known blocks a way of ``(n, 2)`` points, m."""
+        way = self.to_blocks(way_m)
+        return bool(way_is_free(self._clear_px, way, (self.radius_m - SLACK_M) / self.map.resolution_m))
+
+    # --- seeing ---
 
     def clusters(self, shortest_m: float, widest_m: float = np.inf) -> list[Cluster]:
         """Return the connected pieces of the frontier, those shorter than a length left out.
@@ -150,26 +177,28 @@ class Survey:
         result = []
         while pieces:
             piece = pieces.pop(0)
+            length_m = float(self.border[piece[:, 0], piece[:, 1]].sum()) * self.block_m
+            if length_m < shortest_m:
+                continue
             extent = np.ptp(piece, axis=0)
             axis = int(np.argmax(extent))
-            if extent[axis] * self.block_m > widest_m:
+            if extent[axis] * self.coarse_m > widest_m:
                 low = piece[:, axis] <= piece[:, axis].min() + extent[axis] // 2
                 pieces[:0] = [piece[low], piece[~low]]
                 continue
-            length_m = float(self.border[piece[:, 0], piece[:, 1]].sum()) * self.map.resolution_m
-            if length_m < shortest_m:
-                continue
             middle = piece[np.argmin(((piece - piece.mean(axis=0)) ** 2).sum(axis=1))]
-            x, y = self.map.pixel_to_world(((middle[1] + 0.5) * self.block_px, (middle[0] + 0.5) * self.block_px))
+            side = COARSE * self.k
+            x, y = self.map.pixel_to_world(((middle[1] + 0.5) * side, (middle[0] + 0.5) * side))
             result.append(Cluster(piece, float(x), float(y), length_m))
         return result
 
     def gain_m2(self, x_m: float, y_m: float, range_m: float, mean_free_m: float, rays: int = 120) -> float:
-        """Return the unknown area (m^2) that a scan from a point is expected to reveal.
+        """Return the hidden area (m^2) that a scan from a point is expected to reveal.
 
-        Rays end at occupied pixels and at the range. Nobody knows what stands in unknown space: a ray is taken to
-        meet something there after ``mean_free_m`` on average, so what lies deep in it counts for less.
+        Rays end at solid blocks and at the range. Nobody knows what stands in hidden space: a ray is taken to meet
+        something there after ``mean_free_m`` on average, so what lies deep in it counts for less.
         """
-        x, y = self.map.world_to_pixel((x_m, y_m))
-        res = self.map.resolution_m
-        return float(view_gain(self.map.cells, float(x), float(y), range_m / res, mean_free_m / res, rays)) * res * res
+        x, y = self.to_blocks((x_m, y_m))
+        size = self.block_m
+        gain = view_gain(self.blocks, float(x), float(y), range_m / size, mean_free_m / size, rays)
+        return float(gain) * size * size

@@ -12,97 +12,130 @@ Flags = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+OPEN, SOLID, HIDDEN, BLURRED = 0, 1, 2, 3
+"""A block: some of it known free and nothing occupied; something occupied; hidden; unseen between rays."""
+
 
 @kernel
-def stamp_clearance(square: NDArray[np.int32], occupied: IntArray, reach: int) -> None:
-    """Lower the squared distances (pixels, centre to centre) to the nearest occupied pixel around new ones.
+def survey_blocks(cells: Grid, k: int) -> Grid:
+    """Return what each block of ``k`` x ``k`` pixels is: OPEN, SOLID, HIDDEN or BLURRED.
+
+    Hidden blocks lie in a 2 x 2 square of blocks of which nothing is known. The rays of a LiDAR diverge: single
+    unknown blocks between them are no unexplored space.
+    """
+    rows, cols = (cells.shape[0] + k - 1) // k, (cells.shape[1] + k - 1) // k
+    blocks = np.full((rows, cols), BLURRED, dtype=np.uint8)
+    for r in range(cells.shape[0]):
+        for c in range(cells.shape[1]):
+            value = cells[r, c]
+            if value == 1:
+                blocks[r // k, c // k] = SOLID
+            elif value == 0 and blocks[r // k, c // k] == BLURRED:
+                blocks[r // k, c // k] = OPEN
+    for r in range(rows - 1):
+        for c in range(cols - 1):
+            if (
+                blocks[r, c] >= HIDDEN
+                and blocks[r, c + 1] >= HIDDEN
+                and blocks[r + 1, c] >= HIDDEN
+                and blocks[r + 1, c + 1] >= HIDDEN
+            ):
+                blocks[r, c] = blocks[r, c + 1] = blocks[r + 1, c] = blocks[r + 1, c + 1] = HIDDEN
+    return blocks
+
+
+@kernel
+def stamp_clearance(clear: FloatArray, occupied: IntArray, k: int, reach_px: float) -> None:
+    """Lower the clearances (pixels, of block centres) around new occupied pixels, in place.
 
     Parameters
     ----------
-    square
-        ``(rows, cols)``, changed in place; pixels further than ``reach`` keep their value.
+    clear
+        ``(rows, cols)`` of blocks of ``k`` x ``k`` pixels.
     occupied
-        ``(k, 2)`` rows and columns of the new occupied pixels.
-    reach
-        Pixels.
+        ``(n, 2)`` rows and columns of pixels.
+    k, reach_px
+        Pixels; clearances beyond the reach keep their value.
     """
-    rows, cols = square.shape
+    rows, cols = clear.shape
+    reach = int(reach_px / k) + 1
     for n in range(occupied.shape[0]):
-        r0, c0 = occupied[n, 0], occupied[n, 1]
-        for r in range(max(0, r0 - reach), min(rows, r0 + reach + 1)):
-            for c in range(max(0, c0 - reach), min(cols, c0 + reach + 1)):
-                d = (r - r0) ** 2 + (c - c0) ** 2
-                if d < square[r, c]:
-                    square[r, c] = d
+        row, col = occupied[n, 0], occupied[n, 1]
+        for r in range(max(0, row // k - reach), min(rows, row // k + reach + 1)):
+            y = (r + 0.5) * k
+            dy = max(row - y, y - row - 1.0, 0.0)
+            for c in range(max(0, col // k - reach), min(cols, col // k + reach + 1)):
+                x = (c + 0.5) * k
+                dx = max(col - x, x - col - 1.0, 0.0)
+                gap = np.sqrt(dx * dx + dy * dy)
+                if gap < clear[r, c]:
+                    clear[r, c] = gap
 
 
 @kernel
-def block_sums(
-    cells: Grid, square: NDArray[np.int32], contact: float, block: int
-) -> tuple[Flags, Flags, FloatArray, IntArray, IntArray, IntArray]:
-    """Return per block: drivable and known, drivable if unknown is free, clearance, unknown, border, best pixel.
+def coarse_blocks(
+    blocks: Grid, clear: FloatArray, contact: float, m: int
+) -> tuple[Flags, Flags, FloatArray, IntArray, IntArray]:
+    """Gather ``m`` x ``m`` blocks into coarse ones, for drive times.
 
-    The clearance (pixels) and the best pixel (flat index, -1 for none) are those of the drivable pixel with most
-    clearance, known ones first. Unknown and border count pixels; a border pixel is a free one with an unknown
-    pixel beside it.
+    Returns
+    -------
+    known, may, clearance, border, best
+        Whether a robot can stand there in known-free space, and whether it can if hidden space is free; the
+        largest clearance where it can (pixels); number of frontier blocks (open ones beside hidden ones); and the
+        block (flat index) of largest clearance, open ones first, -1 for none.
     """
-    rows, cols = cells.shape
-    shape = ((rows + block - 1) // block, (cols + block - 1) // block)
+    rows, cols = blocks.shape
+    shape = ((rows + m - 1) // m, (cols + m - 1) // m)
     known, may = np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
-    clear = np.zeros(shape)
-    unknown, border = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
-    pixel = np.full(shape, -1, dtype=np.int64)
+    best_clear = np.zeros(shape)
+    border, best = np.zeros(shape, dtype=np.int64), np.full(shape, -1, dtype=np.int64)
     for r in range(rows):
         for c in range(cols):
-            value = cells[r, c]
-            if value == 1:
+            value = blocks[r, c]
+            if value == SOLID:
                 continue
-            a, b = r // block, c // block
-            if value == 2:
-                unknown[a, b] += 1
-            elif (
-                (r > 0 and cells[r - 1, c] == 2)
-                or (r + 1 < rows and cells[r + 1, c] == 2)
-                or (c > 0 and cells[r, c - 1] == 2)
-                or (c + 1 < cols and cells[r, c + 1] == 2)
+            a, b = r // m, c // m
+            if value == OPEN and (
+                (r > 0 and blocks[r - 1, c] == HIDDEN)
+                or (r + 1 < rows and blocks[r + 1, c] == HIDDEN)
+                or (c > 0 and blocks[r, c - 1] == HIDDEN)
+                or (c + 1 < cols and blocks[r, c + 1] == HIDDEN)
             ):
                 border[a, b] += 1
-            d = float(square[r, c])
-            if d <= contact:
+            if clear[r, c] < contact:
                 continue
             may[a, b] = True
-            if value == 0 and not known[a, b]:
+            if value == OPEN and not known[a, b]:
                 known[a, b] = True
-                clear[a, b] = 0.0
-            if (value == 0 or not known[a, b]) and d > clear[a, b]:
-                clear[a, b] = d
-                pixel[a, b] = r * cols + c
-    return known, may, np.sqrt(clear), unknown, border, pixel
+                best_clear[a, b] = 0.0
+            if (value == OPEN or not known[a, b]) and clear[r, c] > best_clear[a, b]:
+                best_clear[a, b] = clear[r, c]
+                best[a, b] = r * cols + c
+    return known, may, best_clear, border, best
 
 
 @kernel
 def drive_times(passable: Flags, slowness: FloatArray, row: int, col: int) -> FloatArray:
     """Return s from a block to every block over eight neighbours, infinite where there is no way.
 
-    ``slowness`` is what crossing a block costs, s. A diagonal step needs one of the two blocks beside it. The queue
-    is a ring of buckets a quarter of the cheapest crossing wide: answers are exact to that width.
+    ``slowness`` is what crossing a block costs, s. A diagonal step needs one of the two blocks beside it. Dijkstra's
+    search with a ring of buckets as wide as the cheapest crossing: no order within a bucket matters.
     """
     rows, cols = passable.shape
     cost = np.full((rows, cols), np.inf)
-    least = np.inf
-    most = 0.0
+    if not passable[row, col]:
+        return cost
+    least, most, count = np.inf, 0.0, 0
     for r in range(rows):
         for c in range(cols):
             if passable[r, c]:
                 least, most = min(least, slowness[r, c]), max(most, slowness[r, c])
-    if not passable[row, col]:
-        return cost
-    width = least
-    ring = int(1.5 * most / width) + 3
-    cap = rows * cols * 8 + 8
+                count += 1
+    ring = int(1.5 * most / least) + 3
     head = np.full(ring, -1, dtype=np.int64)
-    after = np.empty(cap, dtype=np.int64)
-    item = np.empty(cap, dtype=np.int64)
+    after = np.empty(count * 8 + 8, dtype=np.int64)
+    item = np.empty(count * 8 + 8, dtype=np.int64)
     used, queued, turn = 1, 1, 0
     cost[row, col] = 0.0
     head[0], after[0], item[0] = 0, -1, row * cols + col
@@ -119,18 +152,16 @@ def drive_times(passable: Flags, slowness: FloatArray, row: int, col: int) -> Fl
             done[r, c] = True
             for dr in range(-1, 2):
                 for dc in range(-1, 2):
-                    if dr == 0 and dc == 0:
-                        continue
                     y, x = r + dr, c + dc
-                    if not (0 <= y < rows and 0 <= x < cols) or not passable[y, x]:
+                    if not (0 <= y < rows and 0 <= x < cols) or not passable[y, x] or done[y, x]:
                         continue
                     if dr != 0 and dc != 0 and not (passable[r, x] or passable[y, c]):
                         continue
-                    step = 1.4142135623730951 if dr != 0 and dc != 0 else 1.0
-                    reached = cost[r, c] + step * 0.5 * (slowness[r, c] + slowness[y, x])
+                    step = 0.7071067811865476 if dr != 0 and dc != 0 else 0.5
+                    reached = cost[r, c] + step * (slowness[r, c] + slowness[y, x])
                     if reached < cost[y, x]:
                         cost[y, x] = reached
-                        bucket = int(reached / width) % ring
+                        bucket = int(reached / least) % ring
                         after[used], item[used] = head[bucket], y * cols + x
                         head[bucket] = used
                         used += 1
@@ -140,21 +171,21 @@ def drive_times(passable: Flags, slowness: FloatArray, row: int, col: int) -> Fl
 
 
 @kernel
-def view_gain(cells: Grid, x: float, y: float, reach: float, mean_free: float, rays: int) -> float:
-    """Return the expected number of unknown pixels that a scan reveals, by polar integration along rays.
+def view_gain(blocks: Grid, x: float, y: float, reach: float, mean_free: float, rays: int) -> float:
+    """Return the expected number of hidden blocks that a scan reveals, by polar integration along rays.
 
     Parameters
     ----------
-    cells
-        ``(rows, cols)`` of 0 free, 1 occupied, 2 unknown.
+    blocks
+        As of :func:`survey_blocks`.
     x, y
-        Pixel coordinates (column, row) of the scan.
+        Block coordinates (column, row) of the scan.
     reach, mean_free
-        Range, and mean length of a ray in unknown space before it meets something, pixels.
+        Range, and mean length of a ray in hidden space before it meets something, blocks.
     rays
         How many.
     """
-    rows, cols = cells.shape
+    rows, cols = blocks.shape
     total, turn = 0.0, 2.0 * np.pi / rays
     for k in range(rays):
         dx, dy = np.cos(k * turn), np.sin(k * turn)
@@ -162,10 +193,24 @@ def view_gain(cells: Grid, x: float, y: float, reach: float, mean_free: float, r
         d = 0.5
         while d < reach:
             c, r = int(np.floor(x + d * dx)), int(np.floor(y + d * dy))
-            if not (0 <= r < rows and 0 <= c < cols) or cells[r, c] == 1:
+            if not (0 <= r < rows and 0 <= c < cols) or blocks[r, c] == SOLID:
                 break
-            if cells[r, c] == 2:
+            if blocks[r, c] == HIDDEN:
                 total += alive * d * turn
                 alive *= 1.0 - 1.0 / mean_free
             d += 1.0
     return total
+
+
+@kernel
+def way_is_free(clear: FloatArray, way: FloatArray, contact: float) -> bool:
+    """Tell whether nothing known blocks a way, ``(n, 2)`` of (column, row) in blocks, sampled every half block."""
+    rows, cols = clear.shape
+    for n in range(1, way.shape[0]):
+        dx, dy = way[n, 0] - way[n - 1, 0], way[n, 1] - way[n - 1, 1]
+        pieces = int(2.0 * np.hypot(dx, dy)) + 1
+        for p in range(1, pieces + 1):
+            c, r = int(way[n - 1, 0] + dx * p / pieces), int(way[n - 1, 1] + dy * p / pieces)
+            if 0 <= r < rows and 0 <= c < cols and clear[r, c] < contact:
+                return False
+    return True
