@@ -10,6 +10,7 @@ from react_opt.orchestrator.strategy import Strategy, StrategyOptions
 STRATEGIES: dict[str, str] = {
     "oros": "oros:Oros",
     "react": "react:React",
+    "react_plus": "react_plus:ReactPlus",
     "naive": "naive:Naive",
     "nearest": "nearest:Nearest",
     "nearest_areas": "nearest:NearestAreas",

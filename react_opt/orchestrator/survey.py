@@ -95,9 +95,13 @@ class Survey:
             new = np.argwhere(solid & ~self._solid)
         self._solid = solid
         stamp_clearance(self._clear_px, new, self.k, reach_px)
-        self.known, self.may, clear_px, self.border, self.best = coarse_blocks(
+        self.known, self.may, clear_px, self.border, self.hidden, self.best = coarse_blocks(
             self.blocks, self._clear_px, self.radius_m / res - 1e-6, COARSE
         )
+        parts, _ = ndimage.label(self.may, structure=np.ones((3, 3)))
+        sizes = np.bincount(parts.ravel())
+        sizes[0] = 0
+        self.main = parts == np.argmax(sizes) if sizes.any() else self.may  # apart from islands among obstacles
         speed = self.profile.speed_m_s(clear_px * res, self.radius_m)
         self.slowness = np.where(self.known, 1.0, HIDDEN_SLOWER) * self.coarse_m / speed
 
@@ -142,12 +146,9 @@ class Survey:
         nearest one.
         """
         passable = self.may if optimistic else self.known
-        block = self.block_of(x_m, y_m)
-        if not passable[block]:
-            near = self.nearest_block(block, passable, 10)
-            if near is None:
-                return np.full(passable.shape, np.inf)
-            block = near
+        block = self.nearest_block(self.block_of(x_m, y_m), self.main if optimistic else passable, 10)
+        if block is None:
+            return np.full(passable.shape, np.inf)
         return drive_times(passable, self.slowness, block[0], block[1])
 
     def is_free(self, way_m: ArrayLike) -> bool:

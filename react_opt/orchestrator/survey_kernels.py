@@ -75,28 +75,31 @@ def stamp_clearance(clear: FloatArray, occupied: IntArray, k: int, reach_px: flo
 @kernel
 def coarse_blocks(
     blocks: Grid, clear: FloatArray, contact: float, m: int
-) -> tuple[Flags, Flags, FloatArray, IntArray, IntArray]:
+) -> tuple[Flags, Flags, FloatArray, IntArray, IntArray, IntArray]:
     """Gather ``m`` x ``m`` blocks into coarse ones, for drive times.
 
     Returns
     -------
-    known, may, clearance, border, best
+    known, may, clearance, border, hidden, best
         Whether a robot can stand there in known-free space, and whether it can if hidden space is free; the
-        largest clearance where it can (pixels); number of frontier blocks (open ones beside hidden ones); and the
-        block (flat index) of largest clearance, open ones first, -1 for none.
+        largest clearance where it can (pixels); number of frontier blocks (open ones beside hidden ones) and of
+        hidden ones; and the block (flat index) of largest clearance, open ones first, -1 for none.
     """
     rows, cols = blocks.shape
     shape = ((rows + m - 1) // m, (cols + m - 1) // m)
     known, may = np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
     best_clear = np.zeros(shape)
-    border, best = np.zeros(shape, dtype=np.int64), np.full(shape, -1, dtype=np.int64)
+    border, hidden = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    best = np.full(shape, -1, dtype=np.int64)
     for r in range(rows):
         for c in range(cols):
             value = blocks[r, c]
             if value == SOLID:
                 continue
             a, b = r // m, c // m
-            if value == OPEN and (
+            if value == HIDDEN:
+                hidden[a, b] += 1
+            elif value == OPEN and (
                 (r > 0 and blocks[r - 1, c] == HIDDEN)
                 or (r + 1 < rows and blocks[r + 1, c] == HIDDEN)
                 or (c > 0 and blocks[r, c - 1] == HIDDEN)
@@ -112,7 +115,7 @@ def coarse_blocks(
             if (value == OPEN or not known[a, b]) and clear[r, c] > best_clear[a, b]:
                 best_clear[a, b] = clear[r, c]
                 best[a, b] = r * cols + c
-    return known, may, best_clear, border, best
+    return known, may, best_clear, border, hidden, best
 
 
 @kernel

@@ -1,0 +1,232 @@
+"""``react_plus``, this engine's own strategy: the whole fleet's tours through all that is unexplored, always anew.
+
+It differs from REACT (:mod:`react_opt.orchestrator.react`) in what is decided together. There is no area to finish
+before the next one: pieces of the frontier and whole unexplored areas are targets alike, each with the free area that
+it is expected to reveal (:mod:`react_opt.orchestrator.regions`) and the nearest place from which enough of it can be
+seen. The tours of all robots through all targets are planned together, so that coverage grows early and the end comes
+soon (:mod:`react_opt.orchestrator.tours`): a small region is taken along where coming back for it would cost more, an
+area that has been seen in passing is no target any more. The plan is made anew whenever a target has been seen, a
+robot stands, and every few seconds; each robot drives to its first target only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
+from react_opt.orchestrator.orders import Driver, able, distance_m
+from react_opt.orchestrator.regions import Region, Regions
+from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
+from react_opt.orchestrator.survey import Block, Survey
+from react_opt.orchestrator.survey_kernels import OPEN
+from react_opt.orchestrator.tours import insert_all, plan_tours
+
+REPLAN_S = 3.0
+SHARES = np.array([0.8, 0.9, 0.95, 0.97, 0.99, 1.0])
+WEIGHTS = np.array([1.0, 1.0, 1.0, 1.5, 1.0, 0.7])
+"""Shares of the expected whole whose times count, and how much."""
+KEEP_S = 2.0
+"""What turning away from the present target costs, s: new plans must be better than that."""
+SERVICE_S = 1.0
+"""What looking into a region takes beyond the drive, s: braking, turning, driving off."""
+MOST_TARGETS = 40
+WORK = 12_000
+FAR_S = 1e4
+FIELD_S = 6.0
+"""Drive times from a place are worked out again after so long, s."""
+SAME_M = 2.5
+"""A region whose frontier moved less is the same one."""
+GONE = 0.25
+"""A region of which no more than this share is still hidden has been seen."""
+SEEN_M = 0.6
+GIVE_UP_M = 1.0
+STUCK_S = 30.0
+
+
+class ReactPlus:
+    """The strategy of this module."""
+
+    def __init__(self, options: StrategyOptions) -> None:
+        self.options = options
+        self.driver = Driver()
+        self.survey: Survey | None = None
+        self.regions: Regions | None = None
+        self.goals: dict[str, Region] = {}
+        self.names: dict[str, str] = {}
+        self.tours: list[list[tuple[float, float]]] = []
+        self.given_up: list[tuple[float, float, float]] = []
+        self.looked: list[tuple[float, float]] = []
+        self.fields: dict[Block, tuple[float, FloatArray]] = {}
+        self.serial = 0
+        self.planned_s = -np.inf
+        self.over = False
+
+    def decide(self, belief: Belief) -> Decision:
+        """Return what changes now."""
+        robots = able(belief)
+        if self.survey is None or self.regions is None:
+            self.survey = Survey([robot.profile for robot in belief.robots])
+            self.regions = Regions(min(robot.profile.lidar_range_m for robot in belief.robots))
+        self.survey.update(belief.map, belief.version)
+        notes: list[Note] = []
+        if not robots:
+            return Decision(done=True)
+        due = belief.t_s >= self.planned_s + REPLAN_S or len(self.goals) < len(robots)
+        for robot in robots:
+            due |= self._settle(belief, robot, notes)
+        if due:
+            self._plan(belief, robots, notes)
+        orders: list[Order] = []
+        for robot in robots:
+            orders += self._orders(belief, robot)
+        return Decision(orders, notes, done=self.over)
+
+    def _settle(self, belief: Belief, robot: RobotView, notes: list[Note]) -> bool:
+        """Look at a robot's goal: seen, reached in vain, or still to be driven to. Return whether to plan anew."""
+        assert self.survey is not None
+        goal = self.goals.get(robot.id)
+        if goal is None:
+            return False
+        name = self.names[robot.id]
+        if len(goal.blocks):
+            rows, cols = goal.blocks[:, 0], goal.blocks[:, 1]
+            shape = self.survey.hidden.shape
+            inside = (rows < shape[0]) & (cols < shape[1])
+            left = np.count_nonzero(self.survey.hidden[rows[inside], cols[inside]]) / len(rows)
+            if left <= GONE:
+                notes.append(Note("target_inspected", robot=robot.id, target=name))
+                return True
+        if robot.state in ("idle", "stuck"):
+            near = distance_m(robot, goal.view_m) <= SEEN_M
+            if near or robot.state == "stuck":
+                if near:
+                    self.looked.append(goal.view_m)
+                else:
+                    self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
+                why = "looked at; what is left is seen from elsewhere" if near else "no progress"
+                notes.append(Note("target_abandoned", robot=robot.id, target=name, reason=why))
+            return True
+        return False
+
+    # --- planning ---
+
+    def _plan(self, belief: Belief, robots: list[RobotView], notes: list[Note]) -> None:
+        assert self.survey is not None
+        assert self.regions is not None
+        self.planned_s = belief.t_s
+        fields = np.array([self.survey.times_from(robot.x_m, robot.y_m, optimistic=True) for robot in robots])
+        self.given_up = [row for row in self.given_up if row[2] > belief.t_s]
+        found = [
+            region
+            for region in self.regions.find(self.survey, belief.areas, fields.min(axis=0), self.looked)
+            if not any(np.hypot(region.at_m[0] - x, region.at_m[1] - y) < GIVE_UP_M for x, y, _ in self.given_up)
+        ]
+        found = sorted(found, key=lambda region: -region.value_m2)[:MOST_TARGETS]
+        self.over = not found
+        if not found:
+            self.goals, self.tours = {}, []
+            return
+        start_s = np.array([[field[region.view] for region in found] for field in fields]) + SERVICE_S
+        start_s[~np.isfinite(start_s)] = FAR_S
+        between_s = self._between(belief.t_s, found)
+        value = np.array([region.value_m2 for region in found])
+        known_m2 = float(np.count_nonzero(self.survey.blocks == OPEN)) * self.survey.block_m**2
+        first = np.array([self._same(self.goals.get(robot.id), found) for robot in robots], dtype=np.int64)
+        left_s = max(1.0, self.options.horizon_s - belief.t_s)
+        facts = (start_s, between_s, value, known_m2, SHARES, WEIGHTS, left_s, first, KEEP_S)
+        begin, missing = self._begin(found, len(robots))
+        order, _ = plan_tours(insert_all(begin, missing, *facts), *facts, WORK)
+        tours = _split(order)
+        self.tours = [[found[k].at_m for k in tour] for tour in tours]
+        for robot, tour in zip(robots, tours, strict=True):
+            self._take(robot, found[tour[0]] if tour else None, notes)
+        self.goals = {name: goal for name, goal in self.goals.items() if name in {robot.id for robot in robots}}
+
+    def _between(self, now_s: float, found: list[Region]) -> FloatArray:
+        """Return s between the places of regions, from fields that are at most a few seconds old."""
+        assert self.survey is not None
+        rows = []
+        shape = self.survey.hidden.shape
+        for region in found:
+            made_s, field = self.fields.get(region.view, (-np.inf, np.zeros((0, 0))))
+            if now_s > made_s + FIELD_S or field.shape != shape:
+                field = self.survey.times_from(*self.survey.point_of(region.view), optimistic=True)
+                self.fields[region.view] = (now_s, field)
+            rows.append([field[other.view] for other in found])
+        self.fields = {block: row for block, row in self.fields.items() if now_s <= row[0] + FIELD_S}
+        between = np.array(rows) + SERVICE_S
+        between[~np.isfinite(between)] = FAR_S
+        return between
+
+    def _same(self, goal: Region | None, found: list[Region]) -> int:
+        """Return the index of the region that a goal has become, -1 where it is gone."""
+        if goal is None:
+            return -1
+        gaps = [np.hypot(region.at_m[0] - goal.at_m[0], region.at_m[1] - goal.at_m[1]) for region in found]
+        best = int(np.argmin(gaps))
+        return best if gaps[best] <= SAME_M else -1
+
+    def _begin(self, found: list[Region], robots: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the last tours in terms of the regions found now, and the regions that are in none of them."""
+        order: list[int] = []
+        left = set(range(len(found)))
+        at = np.array([region.at_m for region in found])
+        tours = self.tours if len(self.tours) == robots else []
+        for n in range(robots):
+            if n:
+                order.append(-1)
+            for x, y in tours[n] if tours else []:
+                near = [k for k in left if np.hypot(at[k, 0] - x, at[k, 1] - y) <= SAME_M]
+                if near:
+                    best = min(near, key=lambda k: (float(np.hypot(at[k, 0] - x, at[k, 1] - y)), k))
+                    order.append(best)
+                    left.discard(best)
+        return np.array(order, dtype=np.int64), np.array(sorted(left), dtype=np.int64)
+
+    # --- orders ---
+
+    def _take(self, robot: RobotView, region: Region | None, notes: list[Note]) -> None:
+        if region is None:
+            self.goals.pop(robot.id, None)
+            return
+        before = self.goals.get(robot.id)
+        self.goals[robot.id] = region
+        if before is not None and np.hypot(*np.subtract(before.at_m, region.at_m)) <= SAME_M:
+            return
+        self.serial += 1
+        self.names[robot.id] = f"region {self.serial}"
+        notes.append(
+            Note(
+                "target_taken",
+                robot=robot.id,
+                target=self.names[robot.id],
+                reason="area" if region.frontier_m == 0 else f"{region.frontier_m:.1f} m of frontier",
+                x_m=region.at_m[0],
+                y_m=region.at_m[1],
+                size_m2=region.value_m2,
+            )
+        )
+
+    def _orders(self, belief: Belief, robot: RobotView) -> list[Order]:
+        assert self.survey is not None
+        goal = self.goals.get(robot.id)
+        if goal is None:
+            return self.driver.stop(robot)
+        orders = self.driver.go(belief, self.survey, robot, goal.view_m, self.names[robot.id])
+        if orders is None:
+            self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
+            del self.goals[robot.id]
+            return self.driver.stop(robot)
+        return orders
+
+
+def _split(order: NDArray[np.int64]) -> list[list[int]]:
+    """Return the tours, robot by robot."""
+    tours: list[list[int]] = [[]]
+    for k in order.tolist():
+        if k < 0:
+            tours.append([])
+        else:
+            tours[-1].append(k)
+    return tours

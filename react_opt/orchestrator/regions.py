@@ -1,0 +1,303 @@
+"""Unexplored regions as things to visit: what each is worth, and the nearest place to look into it from.
+
+Hidden space is shared out among the pieces of the frontier: each hidden block belongs to the piece it is nearest to
+through hidden space. How much of it a look from there reveals falls with its depth, since nobody knows what stands in
+the way: a share ``exp(-depth / MEAN_FREE_M)`` counts for the piece, the rest for the area in which the block lies,
+as something that has to be driven to. Where hidden space cannot be reached at all (the inside of a machine that has
+been seen from all sides) there is nothing to visit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.kernels import kernel
+from react_opt.orchestrator.belief import AreaView
+from react_opt.orchestrator.strategy import Point
+from react_opt.orchestrator.survey import COARSE, Block, Cluster, Survey
+from react_opt.orchestrator.survey_kernels import SOLID
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MEAN_FREE_M = 3.0
+"""Mean length of a look into hidden space, m."""
+FREE_SHARE = 0.65
+"""Share of hidden space that is expected to be free; the rest is walls and what stands on the floor."""
+MOST_PER_M = 4.0
+"""A metre of frontier reveals at most so many m^2: little is seen through a slit."""
+SHORTEST_M = 0.3
+WIDEST_M = 5.0
+"""Frontier pieces are between so long: shorter ones are noise, longer ones are cut."""
+LEAST_M2 = 0.06
+LEAST_DEEP_M2 = 4.0
+"""Regions worth less are not visited; those that have to be driven to first are worth more or wait."""
+LOOKS_M = (0.0, 0.8, 1.6, 2.6, 4.0)
+LOOK_ANGLES = 12
+"""Places to look from are tried around the middle of the frontier at these distances and so many directions."""
+LOOKED_BLOCKS = 2  # coarse blocks around where a robot looked from that are no place to look from again
+ENOUGH = 0.75
+"""A place that sees this share of what the best place sees will do, if it is nearer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """An unexplored region.
+
+    Parameters
+    ----------
+    at_m
+        Middle of its frontier; of a deep one, middle of its hidden space.
+    view_m, view
+        Where to look into it from: point and coarse block.
+    value_m2
+        Free area that this is expected to reveal.
+    size_m2
+        Hidden area, whatever it is.
+    frontier_m
+        Length of its frontier; 0 for a deep region.
+    area
+        Id of the area in which ``at_m`` lies.
+    blocks
+        ``(k, 2)`` its hidden coarse blocks that can be seen from the frontier, empty for a deep one.
+    """
+
+    at_m: Point
+    view_m: Point
+    view: Block
+    value_m2: float
+    size_m2: float
+    frontier_m: float
+    area: str
+    blocks: IntArray
+
+
+class Regions:
+    """Finds the regions of a survey.
+
+    Parameters
+    ----------
+    range_m
+        How far robots see, m.
+    """
+
+    def __init__(self, range_m: float) -> None:
+        self.range_m = range_m
+        self._area_of: IntArray | None = None
+        self._area_key: tuple[object, ...] = ()
+
+    def areas_of_blocks(self, survey: Survey, areas: Sequence[AreaView]) -> IntArray:
+        """Return for each coarse block the index of its area: the one whose centre is nearest along the worse axis."""
+        key = (survey.hidden.shape, survey.map.origin_x_m, survey.map.origin_y_m, tuple(area.id for area in areas))
+        if key != self._area_key or self._area_of is None:
+            centres = survey.to_blocks(np.array([(area.x_m, area.y_m) for area in areas])) / COARSE
+            rows, cols = survey.hidden.shape
+            dx = np.abs(np.arange(cols)[None, :] + 0.5 - centres[:, 0, None])
+            dy = np.abs(np.arange(rows)[None, :] + 0.5 - centres[:, 1, None])
+            worse = np.maximum(dy[:, :, None], dx[:, None, :])
+            self._area_of, self._area_key = np.argmin(worse, axis=0).astype(np.int64), key
+        return self._area_of
+
+    def find(
+        self,
+        survey: Survey,
+        areas: Sequence[AreaView],
+        time_s: FloatArray,
+        looked_m: Sequence[Point] = (),
+        *,
+        deep: bool = True,
+    ) -> list[Region]:
+        """Return the regions that can be reached, those with a frontier first.
+
+        Parameters
+        ----------
+        survey, areas
+            What is known.
+        time_s
+            ``(rows, cols)`` s to each coarse block for the robot that is nearest, unknown space taken as free.
+        looked_m
+            Where robots have stood and looked: all that is seen from there is known, so they are no places to look
+            from.
+        deep
+            Whether areas with hidden space far behind the frontier are regions too.
+        """
+        clusters = survey.clusters(SHORTEST_M, WIDEST_M)
+        labels = np.full(survey.hidden.shape, -1, dtype=np.int64)
+        for n, cluster in enumerate(clusters):
+            labels[cluster.blocks[:, 0], cluster.blocks[:, 1]] = n
+        area_of = self.areas_of_blocks(survey, areas)
+        block_m2 = survey.block_m**2 * FREE_SHARE
+        near, size, behind, owner, depth = share_out(
+            survey.hidden, labels, len(clusters), area_of, len(areas), np.isfinite(time_s),
+            MEAN_FREE_M / survey.coarse_m,
+        )  # fmt: skip
+        fresh = np.isfinite(time_s)
+        for point in looked_m:
+            row, col = survey.block_of(*point)
+            low_row, low_col = max(0, row - LOOKED_BLOCKS), max(0, col - LOOKED_BLOCKS)
+            fresh[low_row : row + LOOKED_BLOCKS + 1, low_col : col + LOOKED_BLOCKS + 1] = False
+        members = _members(owner, depth, 3.0 / survey.coarse_m, len(clusters))
+        found = []
+        for n, cluster in enumerate(clusters):
+            value = min(float(near[n]) * block_m2, MOST_PER_M * cluster.length_m)
+            if value < LEAST_M2:
+                continue
+            view = self._view(survey, cluster, members[n], np.where(fresh, time_s, np.inf))
+            if view is None:
+                continue
+            row, col = survey.block_of(cluster.x_m, cluster.y_m)
+            found.append(
+                Region(
+                    (cluster.x_m, cluster.y_m),
+                    survey.point_of(view),
+                    view,
+                    value,
+                    float(size[n]) * survey.block_m**2,
+                    cluster.length_m,
+                    areas[int(area_of[row, col])].id,
+                    members[n],
+                )
+            )
+        for n, area in enumerate(areas) if deep else ():
+            value = float(behind[n, 0]) * block_m2
+            if area.unreachable or value < LEAST_DEEP_M2:
+                continue
+            middle = (int(behind[n, 1] / behind[n, 0]), int(behind[n, 2] / behind[n, 0]))
+            block = survey.nearest_block(middle, np.isfinite(time_s) & (survey.hidden > 0), 30)
+            if block is not None:
+                at = survey.point_of(block)
+                size_m2 = float(behind[n, 0]) * survey.block_m**2
+                found.append(Region(at, at, block, value, size_m2, 0.0, area.id, np.zeros((0, 2), np.int64)))
+        return found
+
+    def _view(self, survey: Survey, cluster: Cluster, hidden: IntArray, time_s: FloatArray) -> Block | None:
+        """Return the nearest place that sees enough of a region, None where none can be reached."""
+        middle = survey.to_blocks((cluster.x_m, cluster.y_m)) / COARSE
+        places: dict[Block, None] = {}
+        for radius_m in LOOKS_M:
+            for n in range(LOOK_ANGLES if radius_m > 0 else 1):
+                angle = 2 * np.pi * n / LOOK_ANGLES
+                reach = radius_m / survey.coarse_m
+                row, col = int(middle[1] + reach * np.sin(angle)), int(middle[0] + reach * np.cos(angle))
+                if 0 <= row < time_s.shape[0] and 0 <= col < time_s.shape[1] and np.isfinite(time_s[row, col]):
+                    places[row, col] = None
+        near = survey.nearest_block((int(middle[1]), int(middle[0])), np.isfinite(time_s), 8)
+        if near is not None:
+            places[near] = None
+        if not places:
+            return None
+        candidates = np.array(list(places), dtype=np.int64)
+        targets = hidden if len(hidden) else cluster.blocks
+        seen = seen_from(survey.blocks, candidates, targets, COARSE, self.range_m / survey.block_m)
+        if seen.max() == 0:
+            return near
+        good = seen >= ENOUGH * seen.max()
+        times = np.where(good, time_s[candidates[:, 0], candidates[:, 1]], np.inf)
+        best = candidates[int(np.argmin(times))]
+        return int(best[0]), int(best[1])
+
+
+def _members(owner: IntArray, depth: FloatArray, deepest: float, count: int) -> list[IntArray]:
+    """Return for each frontier piece its hidden coarse blocks that are not deep."""
+    at = np.argwhere((owner >= 0) & (depth <= deepest))
+    of = owner[at[:, 0], at[:, 1]]
+    order = np.argsort(of, kind="stable")
+    edges = np.searchsorted(of[order], np.arange(count + 1))
+    return [at[order[edges[n] : edges[n + 1]]] for n in range(count)]
+
+
+@kernel
+def share_out(
+    hidden: IntArray,
+    labels: IntArray,
+    count: int,
+    area_of: IntArray,
+    areas: int,
+    reachable: NDArray[np.bool_],
+    mean_free: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
+    """Share hidden blocks out among frontier pieces and areas (see this module).
+
+    Parameters
+    ----------
+    hidden
+        ``(rows, cols)`` hidden blocks in each coarse block.
+    labels, count
+        Frontier piece of each coarse block, -1 for none, and how many there are.
+    area_of, areas
+        Area of each coarse block, and how many there are.
+    reachable
+        Whether some robot gets there if hidden space is free.
+    mean_free
+        Coarse blocks.
+
+    Returns
+    -------
+    near, size, behind, owner, depth
+        Per piece its hidden blocks, weighted by depth and not; per area the rest of what can be reached, with the
+        weighted sums of rows and columns; per coarse block its piece (-1: none) and depth (coarse blocks).
+    """
+    rows, cols = hidden.shape
+    near, size, behind = np.zeros(count), np.zeros(count), np.zeros((areas, 3))
+    owner = np.full((rows, cols), -1, dtype=np.int64)
+    depth = np.full((rows, cols), np.inf)
+    queue = np.empty(rows * cols, dtype=np.int64)
+    head, tail = 0, 0
+    for r in range(rows):
+        for c in range(cols):
+            if labels[r, c] >= 0:
+                owner[r, c], depth[r, c] = labels[r, c], 0.0
+                queue[tail] = r * cols + c
+                tail += 1
+    while head < tail:
+        r, c = queue[head] // cols, queue[head] % cols
+        head += 1
+        for n in range(4):
+            y = r + (1 if n == 0 else -1 if n == 1 else 0)
+            x = c + (1 if n == 2 else -1 if n == 3 else 0)
+            if 0 <= y < rows and 0 <= x < cols and owner[y, x] < 0 and hidden[y, x] > 0:
+                owner[y, x], depth[y, x] = owner[r, c], depth[r, c] + 1.0
+                queue[tail] = y * cols + x
+                tail += 1
+    for r in range(rows):
+        for c in range(cols):
+            if hidden[r, c] == 0:
+                owner[r, c] = -1
+                continue
+            share = 0.0
+            if owner[r, c] >= 0:
+                share = np.exp(-depth[r, c] / mean_free)
+                near[owner[r, c]] += share * hidden[r, c]
+                size[owner[r, c]] += hidden[r, c]
+            if reachable[r, c]:
+                rest = (1.0 - share) * hidden[r, c]
+                behind[area_of[r, c], 0] += rest
+                behind[area_of[r, c], 1] += rest * r
+                behind[area_of[r, c], 2] += rest * c
+    return near, size, behind, owner, depth
+
+
+@kernel
+def seen_from(blocks: NDArray[np.uint8], places: IntArray, targets: IntArray, coarse: int, reach: float) -> IntArray:
+    """Return how many of some coarse blocks are in line of sight of each of some others, hidden ones being clear."""
+    seen = np.zeros(places.shape[0], dtype=np.int64)
+    for n in range(places.shape[0]):
+        y0, x0 = (places[n, 0] + 0.5) * coarse, (places[n, 1] + 0.5) * coarse
+        for k in range(targets.shape[0]):
+            dy, dx = (targets[k, 0] + 0.5) * coarse - y0, (targets[k, 1] + 0.5) * coarse - x0
+            gap = np.hypot(dx, dy)
+            if gap > reach:
+                continue
+            pieces = int(gap) + 1
+            clear = True
+            for p in range(1, pieces):
+                if blocks[int(y0 + dy * p / pieces), int(x0 + dx * p / pieces)] == SOLID:
+                    clear = False
+                    break
+            if clear:
+                seen[n] += 1
+    return seen
