@@ -17,6 +17,7 @@ from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptio
 from react_opt.orchestrator.survey import Cluster, Survey
 
 SHORTEST_M = 0.4  # shorter frontiers are noise: a robot is wider
+TRIES = 8
 RECONSIDER_S = 3.0  # explore_lite's planner_frequency is 0.33 Hz
 SAME_M = 2.0  # a frontier that moved less is the same one
 STAND_BLOCKS = 6  # so many coarse blocks away from a frontier a place to stand is looked for
@@ -71,21 +72,28 @@ class Frontiers:
         if self.survey is None:
             self.survey = Survey([robot.profile for robot in belief.robots])
         self.survey.update(belief.map, belief.version)
+        notes: list[Note] = []
+        orders: list[Order] = []
+        for _ in range(TRIES):  # a frontier without a way is given up, and another one chosen
+            answers = self._choose(belief, robots, notes)
+            orders += [order for answer in answers for order in answer or ()]
+            if not any(answer is None for answer in answers):
+                break
+        return Decision(orders, notes, done=not self.goal_m)
+
+    def _choose(self, belief: Belief, robots: list[RobotView], notes: list[Note]) -> list[list[Order] | None]:
+        """Choose where it is due; return the orders of each robot, None where there is no way."""
         clusters = self._clusters(robots)
         for robot in robots:
             self._drop_goal(robot, clusters)
         self.goal_m = {name: at for name, at in self.goal_m.items() if name in {robot.id for robot in robots}}
         waits = [robot for robot in robots if robot.id not in self.goal_m]
-        notes: list[Note] = []
         if clusters and (waits or belief.t_s >= self.last_s + RECONSIDER_S):
             self.last_s = belief.t_s
             choice = self._choice(belief, robots, clusters)
             for robot, picked in zip(robots, self.choose(choice), strict=True):
                 self._take(robot, clusters[picked] if picked >= 0 else None, notes)
-        orders: list[Order] = []
-        for robot in robots:
-            orders += self._orders(belief, robot)
-        return Decision(orders, notes, done=not self.goal_m)
+        return [self._orders(belief, robot) for robot in robots]
 
     def _take(self, robot: RobotView, cluster: Cluster | None, notes: list[Note]) -> None:
         if cluster is None:
@@ -102,7 +110,7 @@ class Frontiers:
             Note("target_taken", robot=robot.id, target=self.names[robot.id], reason=why, x_m=at[0], y_m=at[1])
         )
 
-    def _orders(self, belief: Belief, robot: RobotView) -> list[Order]:
+    def _orders(self, belief: Belief, robot: RobotView) -> list[Order] | None:
         assert self.survey is not None
         at = self.goal_m.get(robot.id)
         if at is None:
@@ -111,7 +119,6 @@ class Frontiers:
         if orders is None:
             self.given_up.append(at)
             del self.goal_m[robot.id]
-            return self.driver.stop(robot)
         return orders
 
     def _clusters(self, robots: Sequence[RobotView]) -> list[Cluster]:

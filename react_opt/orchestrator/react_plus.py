@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 
 from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
 from react_opt.orchestrator.orders import Driver, able, distance_m
-from react_opt.orchestrator.regions import Region, Regions
+from react_opt.orchestrator.regions import Region, Regions, seen_from
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
-from react_opt.orchestrator.survey import Block, Survey
+from react_opt.orchestrator.survey import COARSE, Block, Survey
 from react_opt.orchestrator.survey_kernels import OPEN
 from react_opt.orchestrator.tours import insert_all, plan_tours
 
 REPLAN_S = 3.0
+TRIES = 8
 SHARES = np.array([0.8, 0.9, 0.95, 0.97, 0.99, 1.0])
-WEIGHTS = np.array([1.0, 1.0, 1.0, 1.5, 1.0, 0.7])
+WEIGHTS = np.array([0.3, 1.0, 0.5, 2.0, 1.5, 1.0])
 """Shares of the expected whole whose times count, and how much."""
 KEEP_S = 2.0
 """What turning away from the present target costs, s: new plans must be better than that."""
@@ -75,16 +76,21 @@ class ReactPlus:
         due = belief.t_s >= self.planned_s + REPLAN_S or len(self.goals) < len(robots)
         for robot in robots:
             due |= self._settle(belief, robot, notes)
-        if due:
-            self._plan(belief, robots, notes)
         orders: list[Order] = []
-        for robot in robots:
-            orders += self._orders(belief, robot)
+        for _ in range(TRIES):  # a goal without a way is given up, and the others are planned without it
+            if due:
+                self._plan(belief, robots, notes)
+            answers = {robot.id: self._orders(belief, robot) for robot in robots}
+            orders += [order for answer in answers.values() for order in answer or ()]
+            due = any(answer is None for answer in answers.values())
+            if not due:
+                break
         return Decision(orders, notes, done=self.over)
 
     def _settle(self, belief: Belief, robot: RobotView, notes: list[Note]) -> bool:
         """Look at a robot's goal: seen, reached in vain, or still to be driven to. Return whether to plan anew."""
         assert self.survey is not None
+        assert self.regions is not None
         goal = self.goals.get(robot.id)
         if goal is None:
             return False
@@ -93,8 +99,11 @@ class ReactPlus:
             rows, cols = goal.blocks[:, 0], goal.blocks[:, 1]
             shape = self.survey.hidden.shape
             inside = (rows < shape[0]) & (cols < shape[1])
-            left = np.count_nonzero(self.survey.hidden[rows[inside], cols[inside]]) / len(rows)
-            if left <= GONE:
+            hidden = goal.blocks[inside][self.survey.hidden[rows[inside], cols[inside]] > 0]
+            view = np.array([goal.view], dtype=np.int64)
+            reach = self.regions.range_m / self.survey.block_m
+            # what is hidden still but not in sight from the place to look from is no reason to go there
+            if seen_from(self.survey.blocks, view, hidden, COARSE, reach)[0] <= GONE * len(rows):
                 notes.append(Note("target_inspected", robot=robot.id, target=name))
                 return True
         if robot.state in ("idle", "stuck"):
@@ -208,7 +217,8 @@ class ReactPlus:
             )
         )
 
-    def _orders(self, belief: Belief, robot: RobotView) -> list[Order]:
+    def _orders(self, belief: Belief, robot: RobotView) -> list[Order] | None:
+        """Return the orders of a robot, None where there is no way to its goal, which is given up."""
         assert self.survey is not None
         goal = self.goals.get(robot.id)
         if goal is None:
@@ -217,7 +227,6 @@ class ReactPlus:
         if orders is None:
             self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
             del self.goals[robot.id]
-            return self.driver.stop(robot)
         return orders
 
 

@@ -146,8 +146,8 @@ class Regions:
             value = min(float(near[n]) * block_m2, MOST_PER_M * cluster.length_m)
             if value < LEAST_M2:
                 continue
-            view = self._view(survey, cluster, members[n], np.where(fresh, time_s, np.inf))
-            if view is None:
+            view, share = self._view(survey, cluster, members[n], np.where(fresh, time_s, np.inf))
+            if view is None or value * share < LEAST_M2:
                 continue
             row, col = survey.block_of(cluster.x_m, cluster.y_m)
             found.append(
@@ -155,7 +155,7 @@ class Regions:
                     (cluster.x_m, cluster.y_m),
                     survey.point_of(view),
                     view,
-                    value,
+                    value * share,
                     float(size[n]) * survey.block_m**2,
                     cluster.length_m,
                     areas[int(area_of[row, col])].id,
@@ -174,8 +174,10 @@ class Regions:
                 found.append(Region(at, at, block, value, size_m2, 0.0, area.id, np.zeros((0, 2), np.int64)))
         return found
 
-    def _view(self, survey: Survey, cluster: Cluster, hidden: IntArray, time_s: FloatArray) -> Block | None:
-        """Return the nearest place that sees enough of a region, None where none can be reached."""
+    def _view(
+        self, survey: Survey, cluster: Cluster, hidden: IntArray, time_s: FloatArray
+    ) -> tuple[Block | None, float]:
+        """Return the nearest place that sees enough of a region (None where none does), and what share it sees."""
         middle = survey.to_blocks((cluster.x_m, cluster.y_m)) / COARSE
         places: dict[Block, None] = {}
         for radius_m in LOOKS_M:
@@ -189,16 +191,16 @@ class Regions:
         if near is not None:
             places[near] = None
         if not places:
-            return None
+            return None, 0.0
         candidates = np.array(list(places), dtype=np.int64)
         targets = hidden if len(hidden) else cluster.blocks
         seen = seen_from(survey.blocks, candidates, targets, COARSE, self.range_m / survey.block_m)
         if seen.max() == 0:
-            return near
+            return None, 0.0
         good = seen >= ENOUGH * seen.max()
         times = np.where(good, time_s[candidates[:, 0], candidates[:, 1]], np.inf)
         best = candidates[int(np.argmin(times))]
-        return int(best[0]), int(best[1])
+        return (int(best[0]), int(best[1])), float(seen[int(np.argmin(times))]) / len(targets)
 
 
 def _members(owner: IntArray, depth: FloatArray, deepest: float, count: int) -> list[IntArray]:
