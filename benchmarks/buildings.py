@@ -82,9 +82,7 @@ def _furnish(cells: Cells, rng: np.random.Generator) -> None:
         else:
             w = h = int(rng.integers(3, 7))
         r, c = int(rng.integers(3, max(4, rows - h - 3))), int(rng.integers(3, max(4, cols - w - 3)))
-        if (cells[max(0, r - 8) : r + h + 8, max(0, c - 8) : c + w + 8] == FREE).all():
-            cells[r : r + h, c : c + w] = OCCUPIED
-        elif rng.random() < 0.25:  # against a wall or another machine
+        if (cells[max(0, r - 8) : r + h + 8, max(0, c - 8) : c + w + 8] == FREE).all() or rng.random() < 0.25:
             cells[r : r + h, c : c + w] = OCCUPIED
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from react_opt.instance import InspectionInstance, InspectionRobot, InspectionTarget, InspectionTravel
 from react_opt.orchestrator.belief import Belief, LocalTarget, RobotView
 from react_opt.orchestrator.orders import Driver, distance_m
-from react_opt.orchestrator.strategy import Note, Order, StrategyOptions
+from react_opt.orchestrator.strategy import Note, Order, Point, StrategyOptions
 from react_opt.orchestrator.survey import Survey
 from react_opt.plan import InspectionPlan
 from react_opt.planner import solve
@@ -33,10 +35,16 @@ class Inspection:
         self.given_up: set[str] = set()
 
     def step(
-        self, belief: Belief, survey: Survey, robots: list[RobotView], notes: list[Note]
+        self,
+        belief: Belief,
+        survey: Survey,
+        robots: list[RobotView],
+        targets: Sequence[LocalTarget],
+        looked: list[Point],
+        notes: list[Note],
     ) -> tuple[list[Order], bool]:
         """Return the orders that change, and whether the inspection is over."""
-        known = {target.id: target for target in belief.targets if target.stand_m is not None}
+        known = {target.id: target for target in targets if target.stand_m is not None}
         for robot in robots:
             goal = self.goals.get(robot.id)
             at_goal = goal in known and robot.state in ("idle", "stuck")
@@ -46,6 +54,8 @@ class Inspection:
                 why = "still unknown from where it should be seen" if near else "no progress"
                 notes.append(Note("target_abandoned", robot=robot.id, target=goal, reason=why))
                 self.given_up.add(goal)
+                if near and goal_m is not None:
+                    looked.append(goal_m)
             if goal is not None and (goal not in known or goal in self.given_up):
                 del self.goals[robot.id]
         left = {name: target for name, target in known.items() if name not in self.given_up}

@@ -31,6 +31,7 @@ from react_opt.models.priorities import is_postponed
 from react_opt.orchestrator.belief import AreaView, Belief, LocalTarget, RobotView
 from react_opt.orchestrator.deferred import Inspection
 from react_opt.orchestrator.highlevel import Place, area_at, goal_of, high_level
+from react_opt.orchestrator.local_targets import LocalTargets
 from react_opt.orchestrator.orders import Driver, able, distance_m
 from react_opt.orchestrator.priority import priorities
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
@@ -70,12 +71,16 @@ class React:
         self.inspection: Inspection | None = None
         self.driver = Driver()
         self.survey: Survey | None = None
+        self.local: LocalTargets | None = None
+        self.looked: list[tuple[float, float]] = []
+        self.targets: tuple[LocalTarget, ...] = ()
         self.begun = False
 
     def decide(self, belief: Belief) -> Decision:
         """Return what changes now; called at every map update (line 2)."""
         notes: list[Note] = []
-        if self.survey is None:
+        if self.survey is None or self.local is None:
+            self.local = LocalTargets(min(robot.profile.lidar_range_m for robot in belief.robots))
             self.survey = Survey([robot.profile for robot in belief.robots])
         self.survey.update(belief.map, belief.version)
         areas = {area.id: area for area in belief.areas}
@@ -85,8 +90,9 @@ class React:
             del self.state[name]
         for robot in robots:
             self.state.setdefault(robot.id, RobotState())
-        self._abandon(belief, robots, notes)
-        open_targets = self._targets(belief, notes)  # line 4
+        self.targets = self.local.find(belief, self.survey, robots, self.looked)
+        self._abandon(robots, notes)
+        open_targets = self._targets(notes)  # line 4
         costs = {robot.id: self._costs(belief, robot, open_targets) for robot in robots}
         changed = bool(lost) or not self.begun
         for area in belief.areas:
@@ -104,9 +110,9 @@ class React:
 
     # --- targets ---
 
-    def _abandon(self, belief: Belief, robots: list[RobotView], notes: list[Note]) -> None:
+    def _abandon(self, robots: list[RobotView], notes: list[Note]) -> None:
         """Give up targets whose robot is stuck, or that stay unknown though a robot stood where they should be seen."""
-        known = {target.id: target for target in belief.targets}
+        known = {target.id: target for target in self.targets}
         self.abandoned = {name: at for name, at in self.abandoned.items() if name in known}
         for name, at in list(self.abandoned.items()):
             stand_m = known[name].stand_m
@@ -122,15 +128,17 @@ class React:
                 why = "still unknown from where it should be seen" if there else "no progress"
                 notes.append(Note("target_abandoned", robot=robot.id, target=state.goal, reason=why))
                 self.abandoned[state.goal] = known[state.goal].stand_m
+                if there and goal_m is not None:
+                    self.looked.append(goal_m)
                 state.goal = None
 
-    def _targets(self, belief: Belief, notes: list[Note]) -> list[tuple[LocalTarget, float]]:
+    def _targets(self, notes: list[Note]) -> list[tuple[LocalTarget, float]]:
         """Return the targets that are not postponed, with their priorities (line 4)."""
-        values = priorities(belief.targets)
+        values = priorities(self.targets)
         low = is_postponed(values, self.options.postpone_below) if self.postpones else np.zeros(len(values), bool)
         kept: list[tuple[LocalTarget, float]] = []
         postponed = set()
-        for target, value, is_low in zip(belief.targets, values.tolist(), low.tolist(), strict=True):
+        for target, value, is_low in zip(self.targets, values.tolist(), low.tolist(), strict=True):
             if is_low or target.id in self.abandoned or target.stand_m is None:
                 postponed.add(target.id)
                 if target.id not in self.postponed:
@@ -152,7 +160,8 @@ class React:
         mine = [target for target, _ in targets if target.area == area]
         if area is None or not mine:
             return {}
-        time_s, energy_j = belief.costs(robot, np.array([target.stand_m for target in mine], dtype=np.float64))
+        points = np.array([target.stand_m for target in mine], dtype=np.float64)
+        time_s, energy_j = belief.costs(robot, points, optimistic=True)
         return {
             target.id: (float(t), float(e))
             for target, t, e in zip(mine, time_s, energy_j, strict=True)
@@ -304,5 +313,5 @@ class React:
         if self.inspection is None:
             self.inspection = Inspection(self.options, self.driver)
         assert self.survey is not None
-        orders, done = self.inspection.step(belief, self.survey, robots, notes)
+        orders, done = self.inspection.step(belief, self.survey, robots, self.targets, self.looked, notes)
         return Decision(orders, notes, done)

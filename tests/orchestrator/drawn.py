@@ -14,10 +14,10 @@ from scipy import ndimage
 
 from react_opt.energy import RobotProfile
 from react_opt.geometry.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
-from react_opt.geometry.sight import segment_free_px
+from react_opt.geometry.raycast import ray_table, scan_px
 from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget, RobotView
 from react_opt.orchestrator.strategy import Decision, Strategy
-from react_opt.orchestrator.survey import Survey
+from react_opt.orchestrator.survey import COARSE, Survey
 
 PROFILE = RobotProfile(
     length_m=0.3, width_m=0.3, speed_max_m_s=1.0, speed_min_m_s=1.0, full_speed_clearance_m=0.3, accel_m_s2=1.0,
@@ -26,7 +26,7 @@ PROFILE = RobotProfile(
 )  # fmt: skip
 
 
-def drawn(text: str, pixels_per_char: int = 2) -> np.ndarray[Any, Any]:
+def drawn(text: str, pixels_per_char: int = 5) -> np.ndarray[Any, Any]:
     """Return the pixels of a drawing: ``#`` is a wall, everything else free; the last line has the smallest y."""
     lines = text.strip("\n").split("\n")[::-1]
     width = max(map(len, lines))
@@ -36,7 +36,7 @@ def drawn(text: str, pixels_per_char: int = 2) -> np.ndarray[Any, Any]:
 
 @dataclass
 class DrawnBelief:
-    """A belief in which everything can be set by hand; one pixel is 0.25 m."""
+    """A belief in which everything can be set by hand; one pixel is 0.1 m."""
 
     cells: np.ndarray[Any, Any]
     robots: tuple[RobotView, ...]
@@ -44,7 +44,7 @@ class DrawnBelief:
     t_s: float = 0.0
     version: int = 0
     given_targets: tuple[LocalTarget, ...] | None = None
-    resolution_m: float = 0.25
+    resolution_m: float = 0.1
 
     @property
     def map(self) -> OccupancyMap:
@@ -68,13 +68,15 @@ class DrawnBelief:
                 cells = self.cells[part]
                 known, unknown = int((cells == FREE).sum()), int((cells == UNKNOWN).sum())
                 x, y = (a + 0.5) * self.area_m, (b + 0.5) * self.area_m
-                at = np.argwhere(np.isfinite(reach[part]))
+                wide = side // COARSE
+                coarse = np.s_[b * wide : (b + 1) * wide, a * wide : (a + 1) * wide]
+                at = np.argwhere(np.isfinite(reach[coarse]))
                 stand = (x, y)
                 if len(at):
-                    best = at[np.argmin(((at - side / 2 + 0.5) ** 2).sum(axis=1))]
-                    stand = survey.point_of((int(best[0]) + b * side, int(best[1]) + a * side))
+                    best = at[np.argmin(((at - wide / 2 + 0.5) ** 2).sum(axis=1))]
+                    stand = survey.point_of((int(best[0]) + b * wide, int(best[1]) + a * wide))
                 share = known / (known + unknown) if known else 0.0
-                result.append(AreaView(f"{a},{b}", x, y, stand, share, not bool(np.isfinite(may[part]).any())))
+                result.append(AreaView(f"{a},{b}", x, y, stand, share, not bool(np.isfinite(may[coarse]).any())))
         return tuple(result)
 
     @property
@@ -99,7 +101,7 @@ class DrawnBelief:
                         continue
                     y, x = (at.mean(axis=0) + 0.5) * self.resolution_m
                     near = np.argwhere(np.isfinite(reach))
-                    gap = ((near - edge[len(edge) // 2]) ** 2).sum(axis=1)
+                    gap = ((near - edge[len(edge) // 2] / COARSE) ** 2).sum(axis=1)
                     stand = survey.point_of(tuple(near[int(np.argmin(gap))])) if len(near) else None
                     size = len(at) * self.resolution_m**2
                     result.append(
@@ -166,17 +168,11 @@ class Loop:
         self._see()
 
     def _see(self) -> None:
-        padded = np.pad((self.truth == OCCUPIED).astype(np.uint8), 1, constant_values=1)
         res = self.belief.resolution_m
-        cells = self.belief.cells
+        found = np.empty(self.truth.size, dtype=np.int64)
         for robot in self.belief.robots:
-            reach = robot.profile.lidar_range_m / res
-            x, y = robot.x_m / res, robot.y_m / res
-            for r, c in np.argwhere(self.truth == FREE):
-                if np.hypot(c + 0.5 - x, r + 0.5 - y) <= reach and segment_free_px(padded, x, y, c + 0.5, r + 0.5):
-                    cells[r, c] = FREE
-        seen = ndimage.binary_dilation(cells == FREE, structure=np.ones((3, 3))) & (self.truth == OCCUPIED)
-        cells[seen] = OCCUPIED
+            x, y, reach = robot.x_m / res, robot.y_m / res, robot.profile.lidar_range_m / res
+            scan_px(self.truth, self.belief.cells, x, y, 1.0, 0.0, ray_table(360), reach, found)
         self.belief.version += 1
 
     def run(self, limit_s: float, step_s: float = 1.0) -> float:
