@@ -138,8 +138,7 @@ class Frontiers:
         """Return where to drive to for a frontier: the drivable block nearest to its middle."""
         assert self.survey is not None
         block = self.survey.block_of(x_m, y_m)
-        near = self.survey.nearest_block(block, self.survey.known, STAND_BLOCKS)
-        near = near or self.survey.nearest_block(block, self.survey.may, STAND_BLOCKS)
+        near = self.survey.nearest_block(block, self.survey.main, STAND_BLOCKS)
         return (x_m, y_m) if near is None else self.survey.point_of(near)
 
     def _drop_goal(self, robot: RobotView, clusters: Sequence[Cluster]) -> None:

@@ -37,10 +37,10 @@ class LocalTargets:
     def find(
         self, belief: Belief, survey: Survey, robots: list[RobotView], looked_m: list[Point]
     ) -> tuple[LocalTarget, ...]:
-        """Return the local targets that robots can reach, in the order they appeared."""
+        """Return the local targets that robots can reach over known-free space, in the order they appeared."""
         if not robots:
             return ()
-        times = [survey.times_from(robot.x_m, robot.y_m, optimistic=True) for robot in robots]
+        times = [survey.times_from(robot.x_m, robot.y_m, optimistic=False) for robot in robots]
         found = self.regions.find(survey, belief.areas, np.min(times, axis=0), looked_m, deep=False)
         named: dict[str, Region] = {}
         for name, before in self._named.items():

@@ -92,7 +92,7 @@ class React:
             self.state.setdefault(robot.id, RobotState())
         self.targets = self.local.find(belief, self.survey, robots, self.looked)
         self._abandon(robots, notes)
-        open_targets = self._targets(notes)  # line 4
+        open_targets = self._targets(belief, robots, notes)  # line 4
         costs = {robot.id: self._costs(belief, robot, open_targets) for robot in robots}
         changed = bool(lost) or not self.begun
         for area in belief.areas:
@@ -132,9 +132,11 @@ class React:
                     self.looked.append(goal_m)
                 state.goal = None
 
-    def _targets(self, notes: list[Note]) -> list[tuple[LocalTarget, float]]:
+    def _targets(self, belief: Belief, robots: list[RobotView], notes: list[Note]) -> list[tuple[LocalTarget, float]]:
         """Return the targets that are not postponed, with their priorities (line 4)."""
-        values = priorities(self.targets)
+        points = np.array([target.stand_m or (target.x_m, target.y_m) for target in self.targets]).reshape(-1, 2)
+        ways = [belief.costs(robot, points)[0] for robot in robots]
+        values = priorities(self.targets, np.fmin.reduce(ways) if ways else None)
         low = is_postponed(values, self.options.postpone_below) if self.postpones else np.zeros(len(values), bool)
         kept: list[tuple[LocalTarget, float]] = []
         postponed = set()
@@ -161,7 +163,7 @@ class React:
         if area is None or not mine:
             return {}
         points = np.array([target.stand_m for target in mine], dtype=np.float64)
-        time_s, energy_j = belief.costs(robot, points, optimistic=True)
+        time_s, energy_j = belief.costs(robot, points)
         return {
             target.id: (float(t), float(e))
             for target, t, e in zip(mine, time_s, energy_j, strict=True)

@@ -124,9 +124,10 @@ class DrawnBelief:
     ) -> tuple[tuple[float, float], ...]:
         survey = self.survey()
         times = survey.times_from(*goal_m, optimistic=optimistic)
-        row, col = survey.block_of(robot.x_m, robot.y_m)
-        if not np.isfinite(times[row, col]):
+        start = survey.nearest_block(survey.block_of(robot.x_m, robot.y_m), np.isfinite(times), 4)
+        if start is None:
             return ()
+        row, col = start
         way = [(robot.x_m, robot.y_m)]
         while times[row, col] > 0:
             around = [
