@@ -32,7 +32,7 @@ KEEP_S = 2.0
 SERVICE_S = 1.0
 """What looking into a region takes beyond the drive, s: braking, turning, driving off."""
 MOST_TARGETS = 40
-WORK = 12_000
+WORK = 8_000
 FAR_S = 1e4
 FIELD_S = 6.0
 """Drive times from a place are worked out again after so long, s."""

@@ -15,6 +15,8 @@ from react_opt.kernels import kernel
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+Facts = tuple[FloatArray, FloatArray, FloatArray, float, FloatArray, FloatArray, float, IntArray, float, FloatArray]
+
 LATE = 3.0
 """A share that is not reached in time costs so many times the time left."""
 
@@ -121,7 +123,7 @@ def plan_tours(
 
     Moves: a run of up to three targets goes elsewhere, forwards or backwards; two targets change places; a stretch
     is driven backwards; the ends of two robots' tours are exchanged (a separator moves). The first move that helps
-    is taken.
+    is taken. What work is left goes into shaking the best tours and descending again.
 
     Parameters
     ----------
@@ -134,11 +136,36 @@ def plan_tours(
     """
     robots, count = start_s.shape
     arrive = np.empty((robots, count + 1))
-    order = begin.copy()
+    facts = (start_s, between_s, value, known, shares, weights, left_s, first, keep_s, arrive)
+    best = begin.copy()
+    best_cost, done = _descend(best, facts, work)
+    n = best.shape[0]
+    order, trial = best.copy(), best.copy()
+    dice = 12345
+    while done < work and n > 2:
+        order[:] = best
+        for _ in range(3):
+            dice = (dice * 1103515245 + 12345) % 2147483648
+            i = (dice >> 8) % n
+            run = 1 + (dice >> 20) % min(3, n - i)
+            dice = (dice * 1103515245 + 12345) % 2147483648
+            _move(order, trial, i, run, (dice >> 8) % (n - run + 1), (dice >> 20) % 2 == 1)
+            order[:] = trial
+        cost, used = _descend(order, facts, work - done)
+        done += used + 1
+        if cost < best_cost - 1e-6:
+            best[:] = order
+            best_cost = cost
+    return best, best_cost
+
+
+@kernel
+def _descend(order: IntArray, facts: Facts, work: int) -> tuple[float, int]:
+    """Improve tours in place until no move helps or the work is used up; return their cost, and the work done."""
     n = order.shape[0]
     trial = np.empty(n, dtype=np.int64)
-    cost = tour_cost(order, start_s, between_s, value, known, shares, weights, left_s, first, keep_s, arrive)
-    done = 0
+    cost = tour_cost(order, *facts)
+    done = 1
     improved = True
     while improved and done < work:
         improved = False
@@ -149,9 +176,7 @@ def plan_tours(
                         continue
                     for back in range(2 if run > 1 else 1):
                         _move(order, trial, i, run, j, back == 1)
-                        new = tour_cost(
-                            trial, start_s, between_s, value, known, shares, weights, left_s, first, keep_s, arrive
-                        )
+                        new = tour_cost(trial, *facts)
                         done += 1
                         if new < cost - 1e-6:
                             order[:] = trial
@@ -162,7 +187,7 @@ def plan_tours(
                     break
                 trial[:] = order
                 trial[i], trial[j] = order[j], order[i]
-                new = tour_cost(trial, start_s, between_s, value, known, shares, weights, left_s, first, keep_s, arrive)
+                new = tour_cost(trial, *facts)
                 done += 1
                 if new < cost - 1e-6:
                     order[:] = trial
@@ -170,12 +195,12 @@ def plan_tours(
                 trial[:] = order
                 for k in range(j - i + 1):
                     trial[i + k] = order[j - k]
-                new = tour_cost(trial, start_s, between_s, value, known, shares, weights, left_s, first, keep_s, arrive)
+                new = tour_cost(trial, *facts)
                 done += 1
                 if new < cost - 1e-6:
                     order[:] = trial
                     cost, improved = new, True
-    return order, cost
+    return cost, done
 
 
 @kernel

@@ -1,0 +1,94 @@
+"""The survey of a belief's map: clearances and drive times against plain computations, frontiers and views by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from react_opt.geometry.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
+from react_opt.orchestrator.regions import seen_from
+from react_opt.orchestrator.survey import COARSE, Survey
+from react_opt.orchestrator.survey_kernels import drive_times
+
+from .drawn import PROFILE
+
+
+def survey_of(cells: np.ndarray, survey: Survey | None = None, version: int = 0) -> Survey:  # type: ignore[type-arg]
+    survey = survey or Survey([PROFILE])
+    survey.update(OccupancyMap(cells, 0.1), version)
+    return survey
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_drive_times_are_those_of_plain_dijkstra(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    passable, slowness = rng.random((12, 15)) < 0.7, rng.uniform(0.2, 1.0, (12, 15))
+    passable[3, 4] = True
+    rows, cols = passable.shape
+    edges = []
+    for r, c in np.argwhere(passable):
+        for dr in (-1, 0, 1):
+            for dc in (-1, 0, 1):
+                y, x = r + dr, c + dc
+                if (dr, dc) == (0, 0) or not (0 <= y < rows and 0 <= x < cols and passable[y, x]):
+                    continue
+                if dr and dc and not (passable[r, x] or passable[y, c]):
+                    continue
+                edges.append((r * cols + c, y * cols + x, np.hypot(dr, dc) * (slowness[r, c] + slowness[y, x]) / 2))
+    i, j, w = np.array(edges).T
+    graph = coo_array((w, (i.astype(int), j.astype(int))), shape=(rows * cols, rows * cols)).tocsr()
+    expected = dijkstra(graph, indices=3 * cols + 4).reshape(rows, cols)
+    np.testing.assert_allclose(drive_times(passable, slowness, 3, 4), expected, rtol=1e-12)
+
+
+def test_updates_give_what_a_new_survey_of_the_last_map_gives() -> None:
+    rng = np.random.default_rng(3)
+    cells = np.full((60, 50), UNKNOWN, dtype=np.uint8)
+    survey = survey_of(cells.copy())
+    for version in range(1, 5):
+        low_row, low_col = rng.integers(0, 40, 2)
+        cells[low_row : low_row + 20, low_col : low_col + 20] = FREE
+        cells[rng.integers(0, 60, 20), rng.integers(0, 50, 20)] = OCCUPIED
+        survey_of(cells.copy(), survey, version)
+    fresh = survey_of(cells)
+    for name in ("blocks", "known", "may", "border", "hidden", "best", "slowness"):
+        np.testing.assert_array_equal(getattr(survey, name), getattr(fresh, name), err_msg=name)
+
+
+def test_single_unseen_pixels_between_rays_are_no_frontier() -> None:
+    cells = np.full((40, 40), FREE, dtype=np.uint8)
+    cells[10::7, 5:35:3] = UNKNOWN
+    assert survey_of(cells).clusters(0.0) == []
+    cells[20:30, 20:30] = UNKNOWN  # a square of 1 m: its border is 4 m of open blocks beside it
+    (cluster,) = survey_of(cells).clusters(0.5)
+    assert cluster.length_m == pytest.approx(4.0, abs=0.3)
+
+
+def test_long_frontiers_are_cut() -> None:
+    cells = np.full((80, 100), FREE, dtype=np.uint8)
+    cells[40:] = UNKNOWN
+    assert len(survey_of(cells).clusters(0.3)) == 1
+    pieces = survey_of(cells).clusters(0.3, 4.0)
+    assert len(pieces) > 2
+    assert sum(piece.length_m for piece in pieces) == pytest.approx(10.0, abs=0.3)
+
+
+def test_what_stands_behind_a_wall_is_not_seen() -> None:
+    blocks = np.zeros((20, 20), dtype=np.uint8)
+    blocks[:15, 10] = OCCUPIED  # a wall with an opening above
+    places = np.array([[2, 2], [9, 2]])  # coarse blocks: below, and level with the opening
+    targets = np.array([[2, 8], [9, 8]])
+    assert seen_from(blocks, places, targets, COARSE, 40.0).tolist() == [0, 1]
+
+
+def test_a_gap_narrower_than_the_robot_is_no_way() -> None:
+    cells = np.full((60, 60), FREE, dtype=np.uint8)
+    cells[30:32] = OCCUPIED
+    cells[30:32, 20:23] = FREE  # 0.3 m; the robot is 0.42 m across
+    assert not np.isfinite(survey_of(cells).times_from(3.0, 1.0, optimistic=True)[25, 10])
+    cells[30:32, 20:27] = FREE
+    assert np.isfinite(survey_of(cells).times_from(3.0, 1.0, optimistic=True)[25, 10])
+    assert ndimage.label(survey_of(cells).may)[1] == 1

@@ -1,0 +1,71 @@
+"""Tours of the fleet: the local search against all orders of a few targets, and what the cost stands for."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from react_opt.orchestrator.tours import insert_all, plan_tours, tour_cost
+
+SHARES = np.array([0.8, 0.97, 1.0])
+WEIGHTS = np.array([1.0, 2.0, 1.0])
+
+
+def line(at: list[float], starts: list[float], value: list[float], left_s: float = 1000.0):  # type: ignore[no-untyped-def]
+    """Return the facts of targets on a line, where a metre takes a second."""
+    x, s = np.array(at), np.array(starts)
+    first = np.full(len(s), -1, dtype=np.int64)
+    return (
+        np.abs(s[:, None] - x[None]), np.abs(x[:, None] - x[None]), np.array(value), 0.0, SHARES, WEIGHTS, left_s,
+        first, 0.0,
+    )  # fmt: skip
+
+
+def planned(facts, work: int = 20_000):  # type: ignore[no-untyped-def]
+    robots, count = facts[0].shape
+    begin = insert_all(np.full(robots - 1, -1, dtype=np.int64), np.arange(count), *facts)
+    return plan_tours(begin, *facts, work)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_small_fleets_get_the_best_of_all_tours(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points, starts = rng.uniform(0, 30, (4, 2)), rng.uniform(0, 30, (2, 2))
+    facts = (
+        np.hypot(*(starts[:, None] - points[None]).transpose(2, 0, 1)),
+        np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)),
+        rng.uniform(1, 9, 4), 5.0, SHARES, WEIGHTS, 1000.0, np.full(2, -1, dtype=np.int64), 0.0,
+    )  # fmt: skip
+    best = min(
+        tour_cost(np.array(order), *facts, np.empty((2, 5))) for order in itertools.permutations([0, 1, 2, 3, -1])
+    )
+    order, cost = planned(facts)
+    assert sorted(order.tolist()) == [-1, 0, 1, 2, 3]
+    assert cost <= 1.05 * best  # a local search: on instances so small it is nearly always the optimum
+
+
+def test_a_small_region_on_the_way_is_taken_along() -> None:
+    """From 0: a small one at 2 and a large one at 20. Coming back for the small one would take 18 s."""
+    order, _ = planned(line([20.0, 2.0], [0.0], [50.0, 1.0]))
+    assert order.tolist() == [1, 0]
+
+
+def test_two_robots_share_the_work() -> None:
+    """Robots at 0 and 100, targets beside either: neither crosses the hall."""
+    order, _ = planned(line([2.0, 98.0], [0.0, 100.0], [5.0, 5.0]))
+    assert order.tolist() == [0, -1, 1]
+
+
+def test_a_robot_keeps_its_target_unless_another_is_better_by_more_than_turning_costs() -> None:
+    facts = list(line([10.0, -9.0], [0.0], [5.0, 5.0]))
+    assert planned(tuple(facts))[0].tolist() == [1, 0]
+    facts[7], facts[8] = np.array([0], dtype=np.int64), 3.0
+    assert planned(tuple(facts))[0].tolist() == [0, 1]
+
+
+def test_what_cannot_be_reached_in_time_comes_last() -> None:
+    """With 12 s left the large region at 30 is out of reach: the small one at 10 is visited first."""
+    order, _ = planned(line([30.0, 10.0], [0.0], [50.0, 5.0], left_s=12.0))
+    assert order.tolist() == [1, 0]
