@@ -12,9 +12,9 @@ from react_opt.solvers.routes.memory import Memory
 from react_opt.solvers.routes.rows import violated_limits
 
 MOST_CUTS = 64
-MOST_CUTS_AT_ONCE = 20
+MOST_CUTS_AT_ONCE = 10
 TINY = 1e-6
-HEAVY = 4.0
+HEAVY = 3.0  # times the labels of the first pricings
 
 
 class Tightening:
