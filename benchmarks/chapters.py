@@ -122,9 +122,13 @@ def scaling_table(series: Sequence[Run], wrong: set[tuple[str, str]], axis: str)
             good = [r for r in mine if r.get(field) and (field == "memory_mb" or measures.is_solved(r, wrong))]
             values = [float(r[field]) - figures.base(r, field) for r in good]
             fit = measures.exponent([r["size"][axis] for r in good], values)
-            last.append("-" if fit is None else f"{fit[0]:.2f}")
+            last.append("-" if fit is None else f"{fit[0]:.2f} ({len(good)}/{len(mine)})")
     headings = [axis, *(f"{peer} {unit}" for peer in peers for unit in ("s", "MB"))]
-    text = f"Along {axis}: time to a certified gap of 1 % (> limit where unsolved) and largest resident memory."
+    text = (
+        f"Along {axis}: time to a certified gap of 1 % (> limit where unsolved) and largest resident memory. Exponents "
+        "are fitted to the runs counted behind them: times of solved runs only, so that a series with unsolved runs "
+        "grows faster than its exponent says; memory above what loaded libraries take."
+    )
     return page.Table(headings, [*rows, last], text)
 
 

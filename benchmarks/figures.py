@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -138,8 +139,10 @@ def scaling(series: Sequence[Run], wrong: set[tuple[str, str]], axis: str) -> by
             measured = [run for run in measured if run.get(field)]
             x, y = [run["size"][axis] for run in measured], [float(run[field]) for run in measured]
             fit = measures.exponent(x, [value - base(run, field) for value, run in zip(y, measured, strict=True)])
-            text = peer if fit is None else f"{peer}: exponent {fit[0]:.2f}"
-            axes.plot(x, y, label=text, lw=2, ms=6, **looks[peer])
+            text = peer if fit is None else f"{peer}: exponent {fit[0]:.2f} ({len(measured)} of {len(mine)})"
+            drawn = {run["size"][axis]: float(run[field]) for run in measured}  # a line stops where a run is unsolved
+            line = [(run["size"][axis], drawn.get(run["size"][axis], math.nan)) for run in mine]
+            axes.plot(*zip(*line, strict=True), label=text, lw=2, ms=6, **looks[peer])
             if fit is not None and field == "wall_s":
                 axes.plot(x, [fit[1] * size ** fit[0] for size in x], lw=1, color=looks[peer]["color"], alpha=0.6)
         if open_:
@@ -171,30 +174,39 @@ def base(run: Run, field: str) -> float:
 
 def path_costs(runs: Sequence[Run]) -> bytes | None:
     """Return length against time of cost matrices, one panel per resolution and number of points."""
-    groups = sorted({(run["resolution_m"], run["points"]) for run in runs}, reverse=True)
+    groups = sorted({(-run["resolution_m"], run["points"]) for run in runs})
     if not groups:
         return None
     plt = _pyplot()
     columns = min(3, len(groups))
     rows = -(-len(groups) // columns)
-    figure, panels = plt.subplots(rows, columns, figsize=(3.9 * columns, 3.6 * rows + 0.6), squeeze=False, sharey=True)
+    size = (3.9 * columns, 3.6 * rows + 0.6)
+    figure, panels = plt.subplots(rows, columns, figsize=size, squeeze=False, sharex=True, sharey=True)
     looks = style(sorted({run["peer"] for run in runs}))
     for panel in panels.flat[len(groups) :]:
         panel.set_visible(False)
-    for (resolution_m, points), axes in zip(groups, panels.flat, strict=False):
+    for (minus_m, points), axes in zip(groups, panels.flat, strict=False):
         for run in runs:
-            if (run["resolution_m"], run["points"]) == (resolution_m, points) and run.get("length_mean"):
+            if (-run["resolution_m"], run["points"]) == (minus_m, points) and run.get("length_mean"):
                 look = looks[run["peer"]]
                 spent_s = run["prepare_s"] + run["matrix_s"]
                 longer = max(100 * (run["length_mean"] - 1.0), 1e-3)
-                axes.scatter(spent_s, longer, color=look["color"], marker=look["marker"], s=45, label=run["peer"])
+                face = "none" if run["missing"] else look["color"]
+                axes.scatter(
+                    spent_s, longer, edgecolors=look["color"], facecolors=face, marker=look["marker"], s=45,
+                    label=run["peer"],
+                )  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(plt.NullFormatter())
+        axes.tick_params(labelbottom=True)
         axes.set_xlabel("prepare and matrix, s (log scale)")
-        axes.set_title(f"{points} points, {resolution_m:g} m", fontsize=10)
+        axes.set_title(f"{points} points, {-minus_m:g} m", fontsize=10)
         axes.grid(True, which="major", alpha=0.3)
     for row in panels:
-        row[0].set_ylabel("mean excess length, %\n(log; 0.001 % and less at the foot)")
+        row[0].set_ylabel("mean excess length, %\n(log; exact at the foot; hollow: pairs missing)")
     entries: dict[str, Any] = {}
     for axes in panels.flat:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

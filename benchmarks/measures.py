@@ -171,8 +171,8 @@ def gap_over_time(run: Run, at_s: NDArray[np.float64], wrong: set[tuple[str, str
 
 
 def exponent(x: Sequence[float], y: Sequence[float]) -> tuple[float, float] | None:
-    """Return exponent and factor of ``y = factor x^exponent``, least squares of logarithms; None below 3 points."""
-    if len(set(x)) < 3 or min(y) <= 0:
+    """Return exponent and factor of ``y = factor x^exponent``, least squares of logarithms; None below 4 points."""
+    if len(set(x)) < 4 or min(y) <= 0:
         return None
     slope, intercept = np.polyfit(np.log(x), np.log(y), 1)
     return float(slope), float(math.exp(intercept))

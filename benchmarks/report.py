@@ -212,6 +212,7 @@ def _provenance(found: Results) -> list[page.Block]:
     first = found.headers[0]
     machine = first["machine"]
     commands = list(dict.fromkeys(_command(header) for header in found.headers))
+    loads = ", ".join(str(header["machine"]["load_before"]) for header in found.headers)
     limits = sorted({f"{run['limit_s']:g}" for run in found.solves}, key=float)
     commits = list(dict.fromkeys(str(header["commit"] or "of a release") for header in found.headers))
     return [
@@ -221,8 +222,8 @@ def _provenance(found: Results) -> list[page.Block]:
         ),
         page.Text(
             f"Machine: {machine['processor']}, {machine['cores']} cores, {machine['memory_gb']} GB, "
-            f"{machine['system']}, Python {first['versions'].get('python', 'unknown')}, load {machine['load_before']} "
-            f"before the first run, {first['workers']} runs at a time. Time limits: {', '.join(limits) or '-'} s per "
+            f"{machine['system']}, Python {first['versions'].get('python', 'unknown')}, load {loads} "
+            f"before, {counted(first['workers'], 'run')} at a time. Time limits: {', '.join(limits) or '-'} s per "
             "run, the same for every solver on an instance, as are threads and seeds."
         ),
         page.Text(

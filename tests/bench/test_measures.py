@@ -51,7 +51,7 @@ def test_profiles_compare_solvers_that_met_and_unsolved_is_never_reached() -> No
 def test_exponents_are_fitted_on_logarithms() -> None:
     slope, factor = measures.exponent([1, 2, 4, 8], [3.0, 12.0, 48.0, 192.0]) or (0.0, 0.0)
     assert (slope, factor) == (pytest.approx(2.0), pytest.approx(3.0))
-    assert measures.exponent([1, 2], [1.0, 2.0]) is None
+    assert measures.exponent([1, 2, 4], [1.0, 2.0, 3.0]) is None
 
 
 def test_standings_count_solved_best_wrong_and_late() -> None:
