@@ -27,7 +27,7 @@ from react_opt.solvers.routes.smoothing import SmoothedDual
 
 BEAM = 2
 FIRST_BITS = 4  # cells remembered in one place by the smoothed dual at first
-HOT, COLD = 0.01, 0.001  # temperatures as shares of what a cell earns at best, on average
+HOT, COLD = 0.02, 0.001  # temperatures as shares of what a cell earns at best, on average
 ITERATIONS = 60  # of the quasi-Newton method at one temperature
 PRECISION = 1e-7  # relative change of the smoothed bound at which it ends
 SAMPLE = 300  # routes drawn to look for cycles
@@ -122,7 +122,7 @@ class DualAscent:
 
         minimize(
             value, cell, jac=True, method="L-BFGS-B", bounds=[(0.0, None)] * len(cell), callback=watch,
-            options={"maxiter": ITERATIONS, "maxcor": 20, "ftol": PRECISION},
+            options={"maxiter": ITERATIONS, "maxcor": 50, "ftol": PRECISION},
         )  # fmt: skip
         return np.maximum(0.0, reached)
 

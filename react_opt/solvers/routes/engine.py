@@ -27,7 +27,7 @@ from react_opt.solvers.routes.tightening import Tightening
 from react_opt.solvers.routes.tree import Tree
 
 FIRST_MEMORY = 8
-MANY_CELLS = 150
+MANY_CELLS, MANY_PLACES = 45, 4_000  # cells, cells times instants from which on prices are smoothed first
 PRIMAL_SHARE = 0.05
 WORTH_IT, PATIENCE = 0.05, 2  # share of the gap that tightening has to close, and how often it may fail to
 FIRST_SEARCH_S = 0.004  # per cell
@@ -120,7 +120,7 @@ class _Proof:
             return
         ascent = DualAscent(self.generation, self.memory, self.seed)
         ascent.slots()
-        if self.problem.n_cells > MANY_CELLS:
+        if self.problem.n_cells >= MANY_CELLS and self.problem.reward.size >= MANY_PLACES:
             self._keep_certificate()
             ascent.smooth()
         self._keep_certificate()

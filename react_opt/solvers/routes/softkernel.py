@@ -99,8 +99,17 @@ def soft_pass(graph: SoftGraph, robot: SoftRobot, tables: SoftTables, temperatur
     for i in range(n):
         most_arcs = max(most_arcs, out_start[i + 1] - out_start[i])
     level = np.empty(most_arcs + 1)
+    earliest = np.full(n, horizon + 1)
+    earliest[robot.start] = begin
+    for t in range(begin, horizon + 1):
+        for i in range(n):
+            if earliest[i] == t:
+                for a in range(out_start[i], out_start[i + 1]):
+                    earliest[arc_to[a]] = min(earliest[arc_to[a]], t + arc_steps[a])
     for t in range(horizon, begin - 1, -1):
         for i in range(n):
+            if t < earliest[i]:
+                continue
             low, count = first[i], first[i + 1] - first[i]
             if t == horizon:
                 end = 0.0 if robot.return_to < 0 or robot.return_to == i else NEVER

@@ -168,6 +168,7 @@ def test_solves_from_the_smoothed_dual(block: int, monkeypatch: pytest.MonkeyPat
     """With the ascent of large instances switched on for tiny ones the optimum is that of brute force, and stopped at
     any moment the bound lies above it."""
     monkeypatch.setattr(engine, "MANY_CELLS", 0)
+    monkeypatch.setattr(engine, "MANY_PLACES", 0)
     for seed in range(12 * block, 12 * block + 12):
         problem = random_problem(seed)
         best = brute_force(problem)
