@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +24,7 @@ from react_opt.solvers.routes.memory import Memory
 from react_opt.solvers.routes.pricing import NO_SIDE_PRICES
 from react_opt.solvers.routes.routecolumn import route_column
 from react_opt.solvers.routes.slots import slot_prices
-from react_opt.solvers.routes.smoothing import SmoothedDual
+from react_opt.solvers.routes.smoothing import MOST_WEIGHTS, SmoothedDual
 
 BEAM = 2
 FIRST_BITS = 4  # cells remembered in one place by the smoothed dual at first
@@ -47,10 +48,13 @@ class DualAscent:
         The ng-sets of its pricer, grown along with those of the smoothed dual.
     seed
         Seed of the routes drawn.
+    threads
+        Robot classes that are priced at once.
     """
 
-    def __init__(self, generation: Generation, memory: Memory, seed: int) -> None:
+    def __init__(self, generation: Generation, memory: Memory, seed: int, threads: int = 1) -> None:
         self.generation, self.memory = generation, memory
+        self.threads = max(1, min(threads, len(generation.master.counts)))
         self.master, self.standing = generation.master, generation.standing
         self.problem = generation.pricer.problem
         self.rng = np.random.default_rng(seed)
@@ -67,7 +71,11 @@ class DualAscent:
         """Lower the bound by minimising the smoothed dual until growing its memory does not pay any more."""
         if self.best is None:
             return
-        smooth = SmoothedDual(self.problem, Memory(self.memory.steps, FIRST_BITS).near)
+        places = self.problem.reward.size
+        bits = next((b for b in range(FIRST_BITS, 0, -1) if places << b <= MOST_WEIGHTS), 0)
+        if bits == 0:
+            return
+        smooth = SmoothedDual(self.problem, Memory(self.memory.steps, bits).near, self.threads)
         reward = self.problem.reward.max(axis=1, initial=0.0)
         scale = float(np.mean(reward[reward > 0.0])) if reward.any() else 1.0
         cell, temperature = self.best.duals.cell, HOT * scale
@@ -132,21 +140,27 @@ class DualAscent:
         groups = len(self.master.counts)
         duals = Duals(cell, np.zeros(groups), np.zeros(0), np.zeros(0))
         pricer = self.generation.pricer
-        lowest = np.full(groups, -np.inf)
-        beam = pricer.price(duals, NO_SIDE_PRICES, width=BEAM, columns=1, floor=lowest)
-        floor, known = lowest.copy(), np.isfinite(beam.top)  # unknown where the pass was given up at the deadline
-        floor[known] = beam.top[known] + 1e-9 * np.maximum(1.0, np.abs(beam.top[known]))
-        exact = pricer.price(duals, NO_SIDE_PRICES, columns=1, floor=floor)
+
+        def price(group: int) -> tuple[Column | None, float]:
+            floor = np.full(groups, -np.inf)
+            beam = pricer.price(duals, NO_SIDE_PRICES, width=BEAM, columns=1, groups=[group], floor=floor)
+            if np.isfinite(beam.top[group]):  # unknown where the pass was given up at the deadline
+                floor[group] = beam.top[group] + 1e-9 * max(1.0, abs(float(beam.top[group])))
+            exact = pricer.price(duals, NO_SIDE_PRICES, columns=1, groups=[group], floor=floor)
+            columns = exact.columns or beam.columns
+            return columns[0] if columns else None, np.nan if exact.best is None else float(exact.best[group])
+
+        with ThreadPoolExecutor(self.threads) as pool:
+            found = list(pool.map(price, range(groups)))
         self.standing.budget.spend(2)
-        best: dict[int, Column] = {column.group: column for column in beam.columns}
-        best.update({column.group: column for column in exact.columns})
-        self.master.add(best.values())
-        if exact.best is None:
+        self.master.add([column for column, _ in found if column is not None])
+        best = np.array([top for _, top in found])
+        if np.isnan(best).any():
             return
         self._pricing_s = time.perf_counter() - begun
-        bound = self.generation.bound(duals, exact.best)
+        bound = self.generation.bound(duals, best)
         if self.best is None or bound < self.best.bound:
-            self.best = Multipliers(bound, replace(duals, group=exact.best))
+            self.best = Multipliers(bound, replace(duals, group=best))
             self.generation.best = self.best
             self.standing.lower_bound_to(bound)
 

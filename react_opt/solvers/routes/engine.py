@@ -118,7 +118,7 @@ class _Proof:
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
         if self.standing.done():
             return
-        ascent = DualAscent(self.generation, self.memory, self.seed)
+        ascent = DualAscent(self.generation, self.memory, self.seed, self.threads)
         ascent.slots()
         if self.problem.n_cells >= MANY_CELLS and self.problem.reward.size >= MANY_PLACES:
             self._keep_certificate()

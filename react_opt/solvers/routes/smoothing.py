@@ -12,6 +12,8 @@ of the exact pricing at the prices found.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
 
 import numpy as np
 
@@ -31,19 +33,15 @@ class SmoothedDual:
         The route problem.
     near
         For each cell the cells remembered there, itself included.
+    threads
+        Robot classes that are summed at once; each thread has tables of its own.
     """
 
-    def __init__(self, problem: RouteProblem, near: Sequence[Iterable[int]]) -> None:
+    def __init__(self, problem: RouteProblem, near: Sequence[Iterable[int]], threads: int = 1) -> None:
         self.problem = problem
+        self._threads = max(1, min(threads, len(problem.classes)))
         self.near = [sorted({*cells, j}) for j, cells in enumerate(near)]
-        self._gain = []
-        for group in problem.classes:
-            gain = np.array(problem.reward.T) - problem.sigma * group.sense_j
-            gain[(problem.reward.T <= 0.0) | (gain <= 0.0)] = NEVER
-            gain[: max(1, group.start_step)] = NEVER
-            self._gain.append(gain)
-        self._last: list[SoftRobot] = []
-        self._temperature = 0.0
+        self._cell, self._temperature = np.zeros(problem.n_cells), 1.0
         self._lay_out()
 
     def value(self, cell: FloatArray, temperature: float) -> tuple[float, FloatArray]:
@@ -57,15 +55,28 @@ class SmoothedDual:
             In units of the objective; the bound is above the Lagrangian bound by less than this times the
             logarithm of the number of routes, for every robot.
         """
-        problem = self.problem
-        total, gradient = float(cell.sum()), np.ones(problem.n_cells)
-        self._last, self._temperature = [], temperature
-        for k, group in enumerate(problem.classes):
-            gain = self._gain[k] - cell[None, :]
-            robot = SoftRobot(group.start, group.start_step, group.return_to, problem.sigma * group.wait_j, gain)
-            self._last.append(robot)
-            most, visits = soft_pass(self._graph, robot, self._tables[k], temperature)
-            total += len(group.robots) * (most + problem.sigma * group.battery_j)
+        self._cell, self._temperature = np.array(cell), temperature
+        classes = self.problem.classes
+        parts: Iterable[tuple[float, FloatArray]]
+        if self._threads == 1:
+            parts = [self._pass(k, self._tables[0]) for k in range(len(classes))]
+        else:
+            free: SimpleQueue[SoftTables] = SimpleQueue()
+            for tables in self._tables:
+                free.put(tables)
+
+            def one(k: int) -> tuple[float, FloatArray]:
+                tables = free.get()
+                try:
+                    return self._pass(k, tables)
+                finally:
+                    free.put(tables)
+
+            with ThreadPoolExecutor(self._threads) as pool:
+                parts = list(pool.map(one, range(len(classes))))
+        total, gradient = float(cell.sum()), np.ones(self.problem.n_cells)
+        for group, (most, visits) in zip(classes, parts, strict=True):
+            total += len(group.robots) * (most + self.problem.sigma * group.battery_j)
             gradient -= len(group.robots) * visits
         return total, gradient
 
@@ -81,12 +92,13 @@ class SmoothedDual:
         rng
             Random generator.
         """
-        robot = self._last[robot_class]
+        tables, begin = self._tables[0], self.problem.classes[robot_class].start_step
+        self._pass(robot_class, tables)
+        robot = self._robot(robot_class)
         routes = []
         for _ in range(count):
             random = rng.random((self.problem.horizon + 1, 2))
-            cells, arcs, senses = draw_route(self._graph, robot, self._tables[robot_class], self._temperature, random)
-            begin = robot.start_step
+            cells, arcs, senses = draw_route(self._graph, robot, tables, self._temperature, random)
             routes.append(Route(robot_class, cells[begin:], arcs[begin:], senses[begin:], np.zeros(len(cells) - begin)))
         return routes
 
@@ -114,6 +126,18 @@ class SmoothedDual:
         if added:
             self._lay_out()
         return added
+
+    def _robot(self, robot_class: int) -> SoftRobot:
+        """Return a class at the prices of the last call."""
+        problem, group = self.problem, self.problem.classes[robot_class]
+        reward, sensing = np.ascontiguousarray(problem.reward.T), problem.sigma * group.sense_j
+        gain = reward - (sensing + self._cell)[None, :]
+        gain[(reward <= 0.0) | (reward <= sensing)] = NEVER
+        gain[: max(1, group.start_step)] = NEVER
+        return SoftRobot(group.start, group.start_step, group.return_to, problem.sigma * group.wait_j, gain)
+
+    def _pass(self, robot_class: int, tables: SoftTables) -> tuple[float, FloatArray]:
+        return soft_pass(self._graph, self._robot(robot_class), tables, self._temperature)
 
     def _lay_out(self) -> None:
         """Number the memories and tabulate how arcs carry them."""
@@ -143,4 +167,4 @@ class SmoothedDual:
             first, own, carried, carry,
         )  # fmt: skip
         shape = (problem.horizon + 1, int(first[-1]))
-        self._tables = [SoftTables(np.empty(shape), np.empty(shape), np.empty(shape)) for _ in problem.classes]
+        self._tables = [SoftTables(np.empty(shape), np.empty(shape), np.empty(shape)) for _ in range(self._threads)]

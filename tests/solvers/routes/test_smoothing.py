@@ -180,3 +180,13 @@ def test_solves_from_the_smoothed_dual(block: int, monkeypatch: pytest.MonkeyPat
         for limit in (10, 60, 200):
             stopped = solve_routes(problem, work_limit=limit)
             assert stopped.bound is None or stopped.bound >= best - 1e-9 * max(1.0, abs(best))
+
+
+def test_threads_change_nothing() -> None:
+    """Classes summed at once give what they give one after the other."""
+    problem = next(p for p in map(rich, range(100)) if len(p.classes) == 2 and p.reward.any())
+    price = np.linspace(0.0, 2.0, problem.n_cells)
+    alone = SmoothedDual(problem, everywhere(problem)).value(price, 0.5)
+    together = SmoothedDual(problem, everywhere(problem), threads=2).value(price, 0.5)
+    assert together[0] == alone[0]
+    assert np.array_equal(together[1], alone[1])
