@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from react_opt.instance import Mission
 from react_opt.orchestrator.strategy import Note
+from react_opt.plan import Claim
 from react_opt.sim.robot import SimRobot
 from react_opt.sim.world import World
 from react_opt.trace import (
@@ -73,7 +74,8 @@ class Recorder:
         """Add what a strategy has to say."""
         claim = note.claim
         if claim is not None:  # certificates are large, and wall times differ from run to run
-            claim = claim.model_copy(update={"certificate": None, "wall_s": {}})
+            told = {name: getattr(claim, name) for name in Claim.model_fields}  # of any claim what all claims hold
+            claim = Claim(**told | {"certificate": None, "wall_s": {}})
         self.events.append(TraceEvent.model_validate({**vars(note), "t_s": t_s, "claim": claim}))
 
     def track(self, robot: SimRobot, sensing: bool) -> None:

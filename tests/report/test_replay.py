@@ -12,11 +12,13 @@ import shutil
 
 import numpy as np
 import pytest
-from small_trace import scripted
+from small_trace import FACTORY, scripted
 
-from react_opt import parse, save
+from react_opt import load, parse, save
+from react_opt.instance import Failure, Link
 from react_opt.report.replay import replay_page
 from react_opt.report.show import show
+from react_opt.sim.run import simulate
 from react_opt.trace import NEVER
 
 CHROMIUM, DRIVER = shutil.which("chromium") or shutil.which("google-chrome"), shutil.which("chromedriver")
@@ -199,6 +201,28 @@ def test_text_from_files_is_shown_and_never_run(opened):
     assert text(browser, "title") == evil
     assert evil in text(browser, "decision-what")
     assert evil in text(browser, "claim")
+
+
+def test_a_simulated_mission_with_an_outage_and_a_lost_robot(opened):
+    link = Link(x_m=13.3, y_m=4.0, range_m=40.0, rate_bit_s=1e6, outages_s=((4.0, 8.0),))
+    changes = {"horizon_s": 15.0, "link": link, "failures": (Failure(robot="r2", t_s=10.0),)}
+    trace = simulate(load(FACTORY.parent / "mission_2.json").model_copy(update=changes), FACTORY.parent)
+    browser = opened(trace)
+    for t_s, link_text, sensing in ((2.0, "up", "on"), (6.0, "down", "on"), (12.0, "up", "lost")):
+        scrub(browser, t_s)
+        frame = next(frame for frame in trace.frames if frame.t_s == t_s)
+        assert text(browser, "known-0") == f"{100 * frame.coverage:.1f} %"
+        assert int(text(browser, "battery-0-1").removesuffix(" J")) == pytest.approx(frame.robots[1].battery_j, abs=0.6)
+        assert text(browser, "link-0-1") == link_text
+        assert text(browser, "sensing-0-1") == sensing
+    replans = sorted({event.t_s for event in trace.events if event.type == "replan"})
+    scrub(browser, replans[0])
+    assert f"proven bound{float(f'{claim_at(trace, replans[0]).bound:.7g}'):g}"[:16] in text(browser, "claim")
+
+
+def claim_at(trace, t_s):
+    """Return the last claim of a solver by a time."""
+    return [event.claim for event in trace.events if event.claim is not None and event.t_s <= t_s][-1]
 
 
 @pytest.mark.parametrize("size", [(1600, 1000), (1024, 640), (420, 800)])

@@ -15,6 +15,9 @@ from react_opt.errors import ReactError, UsageError
 from react_opt.geometry import save_map
 from react_opt.instance import Mission, Noise
 from react_opt.jsonio import load, save
+from react_opt.orchestrator.strategy import Note
+from react_opt.plan import InspectionClaim, Secondary
+from react_opt.sim.loop import Simulation
 from react_opt.sim.run import simulate, with_options
 from react_opt.sim.summary import Summary, summarise
 from react_opt.trace import Trace
@@ -108,3 +111,14 @@ def test_every_switching_rule_gets_there_and_saves(folder: Path, rule: str) -> N
     summary = summarise(simulate(MISSION.model_copy(update={"switching": rule}), folder))
     assert summary.coverage > 0.97
     assert sum(robot.sensing_s for robot in summary.robots) < 2 * summary.end_s
+
+
+def test_a_claim_of_an_inspection_is_the_same_after_reading_the_trace_again(tmp_path: Path) -> None:
+    """An inspection claims more than other solvers; what of it the format does not hold must not be in memory either."""
+    simulation = Simulation(MISSION, TWO_ROOMS)
+    second = Secondary(objective=1.0, status="optimal")
+    claim = InspectionClaim(status="optimal", objective=2.0, bound=2.0, secondary=second)
+    simulation.record.note(0.5, Note("replan", reason="inspection", claim=claim))
+    told = simulation.record.trace(finished=True, scan_s=0.25)
+    save(told, tmp_path / "trace.json")
+    assert load(tmp_path / "trace.json").events == told.events

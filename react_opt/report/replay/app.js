@@ -197,7 +197,7 @@ class Replay {
       row.link.textContent = down ? "down" : "up";
       row.link.className = down ? "bad" : "";
       const goal = trace.goal[r][i];
-      row.goal.textContent = goal >= 0 ? trace.goals[goal] : "–";
+      row.goal.textContent = goal >= 0 && trouble !== "lost" ? trace.goals[goal] : "–";
     });
   }
 
