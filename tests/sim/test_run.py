@@ -114,7 +114,7 @@ def test_every_switching_rule_gets_there_and_saves(folder: Path, rule: str) -> N
 
 
 def test_a_claim_of_an_inspection_is_the_same_after_reading_the_trace_again(tmp_path: Path) -> None:
-    """An inspection claims more than other solvers; what of it the format does not hold must not be in memory either."""
+    """An inspection claims more than other solvers do; what the format does not hold of it is not in memory either."""
     simulation = Simulation(MISSION, TWO_ROOMS)
     second = Secondary(objective=1.0, status="optimal")
     claim = InspectionClaim(status="optimal", objective=2.0, bound=2.0, secondary=second)
