@@ -1,20 +1,25 @@
-"""The route decomposition on its families: one row per instance, ``python benchmarks/routes.py [--rows ...]``.
+"""The route decomposition on its families, beside peers on the monolith: ``python benchmarks/routes.py``.
 
-Prints status, objective, bound, gap and time of each instance beside its target. A row that misses its target is
-marked with ``!``.
+Each line is an instance and a solver: status, objective, bound, gap and time beside the row's target. ``!`` marks what
+misses the target, ``worse`` a plan of the decomposition that a peer beats, ``slower`` a proof that a peer had earlier.
+A peer that ends without a proof counts with its limit.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from families import metric_complete, walled_grid
 
+from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance
+from react_opt.models.replay import value
+from react_opt.solvers.monolith import solve_monolith
+from react_opt.solvers.outcome import Request
 from react_opt.solvers.routes.engine import solve_routes
-from react_opt.solvers.routes.result import RoutesResult
 from react_opt.timegraph import route_problem
 
 
@@ -59,39 +64,94 @@ TABLE = [
 ]
 
 
-def solved(row: Row, seed: int, threads: int) -> tuple[RoutesResult, float]:
+@dataclass(frozen=True)
+class Outcome:
+    """What one solver reached on one instance."""
+
+    status: str
+    objective: float | None
+    bound: float | None
+    spent_s: float
+
+    @property
+    def gap(self) -> float | None:
+        if self.objective is None or self.bound is None:
+            return None
+        return (self.bound - self.objective) / max(abs(self.objective), 1e-9)
+
+
+def decomposed(row: Row, seed: int, threads: int, limit_s: float) -> Outcome:
     problem = route_problem(OrosInstance.model_validate(row.data(seed)))
     begun = time.perf_counter()
-    result = solve_routes(problem, deadline=begun + row.limit_s, gap=row.gap or None, threads=threads, seed=seed)
-    return result, time.perf_counter() - begun
+    result = solve_routes(problem, deadline=begun + limit_s, gap=row.gap or None, threads=threads, seed=seed)
+    return Outcome(result.status, result.objective, result.bound, time.perf_counter() - begun)
+
+
+def by_peer(name: str, row: Row, seed: int, threads: int, limit_s: float) -> Outcome:
+    """Solve the monolith by a backend, without a plan to start from; building it counts."""
+    instance = OrosInstance.model_validate(row.data(seed))
+    problem = route_problem(instance)
+    begun = time.perf_counter()
+    request = Request(time_limit_s=limit_s, gap_rel=row.gap or 1e-9, threads=threads, seed=seed)
+    try:
+        outcome, routes = solve_monolith(instance, problem, name, request, None)
+    except UsageError:  # CP-SAT refuses what it cannot state exactly
+        return Outcome("refused", None, None, limit_s)
+    objective = None if routes is None else value(problem, routes)
+    spent_s = time.perf_counter() - begun
+    bound = outcome.bound
+    found = Outcome("optimal" if outcome.status == "optimal" else "feasible", objective, bound, spent_s)
+    return found if found.status == "optimal" else replace(found, spent_s=max(limit_s, spent_s))
+
+
+def seeds_of(words: list[str]) -> list[int]:
+    """Return seeds written one by one or as ranges: ``0 5-7`` is 0, 5, 6, 7."""
+    ends = [word.split("-") for word in words]
+    return [seed for end in ends for seed in range(int(end[0]), int(end[-1]) + 1)]
+
+
+def line(row: Row, seed: int, solver: str, found: Outcome, remark: str) -> str:
+    cells = row.cols if row.rows == 0 else row.rows * row.cols
+    gap = "-" if found.gap is None else f"{found.gap:.2e}"
+    return (
+        f"{row.group:8}{cells:5d} {row.robots:6d} {row.horizon:4d} {row.battery:7g} {seed:4d} {solver:7} "
+        f"{found.status:9} {found.objective or 0.0:12.4f} {found.bound or 0.0:12.4f} {gap:>9} "
+        f"{found.spent_s:8.3f} {row.limit_s:7g} {remark}"
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--groups", nargs="*", default=["paper", "small", "medium", "binding"])
-    parser.add_argument("--seeds", nargs="*", type=int, default=[0])
+    parser.add_argument("--seeds", nargs="*", default=["0"], help="numbers or ranges such as 0-4")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--peers", nargs="*", default=[], help="backends for the monolith: highs cp-sat scip")
+    parser.add_argument("--limit-s", type=float, help="limit of every solver instead of the row's target")
     options = parser.parse_args()
     for battery in (1.0, 0.5):  # compile, or load from the cache, what is compiled
-        solved(Row("warm", 3, 4, 2, 12, 60.0, battery), 0, options.threads)
-    print("group   cells robots T    battery seed status    objective    bound        gap       time_s limit_s")
-    for row in TABLE:
-        if row.group not in options.groups:
-            continue
-        for seed in options.seeds:
-            result, spent_s = solved(row, seed, options.threads)
-            gap = None
-            if result.objective is not None and result.bound is not None:
-                gap = (result.bound - result.objective) / max(abs(result.objective), 1e-9)
-            met = gap is not None and (gap <= row.gap if row.gap else result.status == "optimal")
-            cells = row.cols if row.rows == 0 else row.rows * row.cols
-            print(
-                f"{row.group:8}{cells:5d} {row.robots:6d} {row.horizon:4d} {row.battery:7g} {seed:4d} "
-                f"{result.status:9} {result.objective or 0.0:12.4f} {result.bound or 0.0:12.4f} "
-                f"{-1.0 if gap is None else gap:9.2e} {spent_s:8.3f} {row.limit_s:7g} "
-                f"{'' if met and spent_s <= 1.1 * row.limit_s + 0.1 else '!'}",
-                flush=True,
-            )
+        decomposed(Row("warm", 3, 4, 2, 12, 60.0, battery), 0, options.threads, 60.0)
+    print(
+        "group   cells robots    T battery seed solver  status       objective        bound       gap   time_s limit_s"
+    )
+    ratios: dict[str, list[float]] = {name: [] for name in options.peers}
+    rows = [row for row in TABLE if row.group in options.groups]
+    for row, seed in ((row, seed) for row in rows for seed in seeds_of(options.seeds)):
+        limit_s = options.limit_s or row.limit_s
+        own = decomposed(row, seed, options.threads, limit_s)
+        met = own.gap is not None and (own.gap <= row.gap if row.gap else own.status == "optimal")
+        met &= own.spent_s <= 1.1 * row.limit_s + 0.1
+        print(line(row, seed, "routes", own, "" if met else "!"), flush=True)
+        for name in options.peers:
+            peer = by_peer(name, row, seed, options.threads, limit_s)
+            ratios[name].append(peer.spent_s / own.spent_s)
+            slack = 1e-6 * abs(own.objective or 0.0)
+            worse = peer.objective is not None and peer.objective > (own.objective or 0.0) + slack
+            slower = peer.status == "optimal" and (own.status != "optimal" or peer.spent_s < own.spent_s)
+            print(line(row, seed, name, peer, " ".join(["worse"] * worse + ["slower"] * slower)), flush=True)
+    for name, times in ratios.items():
+        if times:
+            mean = math.exp(sum(map(math.log, times)) / len(times))
+            print(f"{name}: {mean:.1f} times the decomposition's time (geometric mean of {len(times)})")
 
 
 if __name__ == "__main__":

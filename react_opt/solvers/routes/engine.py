@@ -30,7 +30,7 @@ FIRST_MEMORY = 8
 MANY_CELLS, MANY_PLACES = 45, 4_000  # cells, cells times instants from which on prices are smoothed first
 PRIMAL_SHARE = 0.05
 WORTH_IT, PATIENCE = 0.05, 2  # share of the gap that tightening has to close, and how often it may fail to
-FIRST_SEARCH_S = 0.004  # per cell
+FIRST_SEARCH_S = 0.002  # per cell
 FIRST_SEARCH_WORK = 20
 
 
