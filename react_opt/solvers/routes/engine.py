@@ -155,14 +155,11 @@ class _Proof:
     def _branch(self) -> None:
         """Search the tree."""
         assert self.generation.best is not None
-        tree = Tree(self.generation, self.tightening, self.finish, self.standing, self.generation.best, self._between)
+        tree = Tree(self.generation, self.tightening, self.finish, self.standing, self.generation.best)
         tree.run()
         if tree.root.split is not None:
             self.proof = tree_certificate(self.problem, self.memory, tree.root, self.pricer.joule_prices)
         self.notes += tree.notes()
-
-    def _between(self) -> None:
-        """What is done between two parts of the tree."""
 
     def result(self) -> RoutesResult:
         """Return what is known."""

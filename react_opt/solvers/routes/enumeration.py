@@ -38,6 +38,7 @@ def grow_sets(
     other: Labels,
     cutoff: float,
     max_labels: int,
+    stop: NDArray[np.uint8],
 ) -> tuple[Labels, NDArray[np.uint64], bool]:
     """Return one label per cell, instant and exact set of cells that may end at ``cutoff`` or more.
 
@@ -78,6 +79,8 @@ def grow_sets(
         for j in range(n):
             node = tau * n + j
             start[node] = count
+            if stop[0] != 0:
+                complete = False
             if not complete or tau < start_time or completion[0, tau, j] <= NEVER:
                 continue
             mirrored = (last - tau) * n + j
@@ -276,6 +279,7 @@ def enumerate_routes(
         behind,
         cutoff,
         max_labels,
+        pricer.stop,
     )
     if not complete:
         return None

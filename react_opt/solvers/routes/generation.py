@@ -77,7 +77,8 @@ class Generation:
         """Generate columns until the linear programme is solved; return whether it is.
 
         It counts as solved when its value is known to a small part of what it lies above the incumbent: to know
-        more does not help, the programme has to be tightened. Stops early (returning False) at a limit, or when the bound proves the incumbent.
+        more does not help, the programme has to be tightened. Stops early (returning False) at a limit, or when the
+        bound proves the incumbent.
 
         Parameters
         ----------

@@ -7,7 +7,6 @@ whole problem.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,8 +64,6 @@ class Tree:
         The best plan so far and the limits.
     root
         Multipliers of the whole problem.
-    between
-        Called after each part.
     """
 
     def __init__(
@@ -76,10 +73,9 @@ class Tree:
         finish: Finish,
         standing: Standing,
         root: Multipliers,
-        between: Callable[[], None],
     ) -> None:
         self.generation, self.tightening, self.finish = generation, tightening, finish
-        self.standing, self._between = standing, between
+        self.standing = standing
         problem = generation.pricer.problem
         whole = everything(len(generation.counts), problem.n_cells, problem.horizon)
         self.root = Part(whole, root, root.bound)
@@ -97,7 +93,6 @@ class Tree:
             elif part.split is None:
                 self._push(part)
             self.standing.lower_bound_to(self.bound)
-            self._between()
 
     @property
     def bound(self) -> float:

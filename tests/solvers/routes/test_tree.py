@@ -1,10 +1,14 @@
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from react_opt.models.replay import value
 from react_opt.route_problem import RobotClass, RouteProblem
 from react_opt.solvers.routes import engine
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.finish import Finish
+from react_opt.solvers.routes.greedy import greedy
 from react_opt.solvers.routes.region import Region, Split, collections_of, everything
 from react_opt.solvers.routes.result import RoutesResult
 from react_opt.solvers.routes.routecolumn import route_column
@@ -46,14 +50,19 @@ def grid_problem(seed: int, rows: int = 3, cols: int = 4) -> RouteProblem:
     )
 
 
-def by_branching_alone(problem: RouteProblem, patch: pytest.MonkeyPatch, work_limit: int = 6000) -> RoutesResult:
+def by_branching_alone(
+    problem: RouteProblem,
+    patch: pytest.MonkeyPatch,
+    work_limit: int = 6000,
+    should_stop: Callable[[], bool] | None = None,
+) -> RoutesResult:
     """Solve with a weak linear programme (no cuts, no growing memory) and without enumeration."""
     with patch.context() as weak:
         weak.setattr(engine, "FIRST_MEMORY", 2)
         weak.setattr(Tightening, "cut", lambda self: False)
         weak.setattr(Tightening, "grow_memory", lambda self: False)
         weak.setattr(Finish, "bound", lambda self, *_, **__: None)
-        return solve_routes(problem, work_limit=work_limit)
+        return solve_routes(problem, work_limit=work_limit, should_stop=should_stop)
 
 
 @pytest.mark.parametrize("seed", [0, 6, 8, 9, 10, 11, 15, 18, 26, 27, 29])
@@ -75,6 +84,25 @@ def test_the_bound_holds_wherever_the_tree_is_left(monkeypatch: pytest.MonkeyPat
     bounds = [by_branching_alone(problem, monkeypatch, work).bound for work in range(60, 440, 40)]
     assert all(bound is not None and bound >= best - 1e-8 * best for bound in bounds)
     assert bounds == sorted(bounds, reverse=True)
+
+
+def test_interrupted_anywhere_a_bound_and_a_plan_as_good_as_greedy_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupted at any question for the limits: the plan is no worse than greedy, the bound above the optimum, and
+    what the bound rests on is in the claim."""
+    problem = grid_problem(8)
+    best = solve_routes(problem, work_limit=6000).objective
+    first = greedy(problem, None, 0).routes
+    assert best is not None
+    assert first is not None
+    floor = value(problem, first)
+    for asked in range(2, 400, 23):
+        left = iter(range(asked))
+        result = by_branching_alone(problem, monkeypatch, 6000, lambda left=left: next(left, None) is None)
+        assert result.objective is not None
+        assert result.bound is None or result.bound >= best - 1e-8 * best
+        assert floor - 1e-9 <= result.objective <= best + 1e-8 * best
+        assert result.limit == "interrupt" or result.status == "optimal"
+        assert result.bound is None or result.certificate["bound"] <= result.bound * (1 + 1e-7) + 1e-7
 
 
 @pytest.mark.parametrize("split", [Split(5, by=4), Split(5, by=9), Split(5, group=1)])
