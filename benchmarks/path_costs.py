@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.path_trial import spread
 from react_opt.energy import RobotProfile
 from react_opt.geometry import load_map
 from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
@@ -55,15 +56,6 @@ ROWS: list[tuple[str, Callable[[FreeSpace], PathCosts]]] = [
 ]
 
 
-def random_points(space: FreeSpace, count: int, seed: int) -> np.ndarray:
-    """Return points spread evenly over the largest connected region of a map."""
-    largest = int(np.argmax(np.bincount(space.regions.ravel())[1:])) + 1
-    rows, cols = np.nonzero(space.regions == largest)
-    rng = np.random.default_rng(seed)
-    picked = rng.choice(rows.size, count)
-    return space.to_world(np.stack((cols[picked], rows[picked]), axis=1) + rng.random((count, 2)))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("map", nargs="?", type=Path, default=FACTORY if FACTORY.exists() else None)
@@ -88,12 +80,12 @@ def main() -> None:
     print(f"{'method':<12}{'points':>7}{'prepare ms':>12}{'matrix ms':>11}{'pairs':>7}{'length':>8}{'time':>8}")
     references: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     for name, prepare in rows:
-        prepare(space).cost_table(random_points(space, 3, options.seed))  # compile
+        prepare(space).cost_table(spread(space, 3, options.seed))  # compile
         begun = time.perf_counter()
         costs = prepare(space)
         prepared_s = time.perf_counter() - begun
         for count in options.points:
-            points = random_points(space, count, options.seed)
+            points = spread(space, count, options.seed)
             begun = time.perf_counter()
             table = costs.cost_table(points)
             matrix_s = time.perf_counter() - begun
