@@ -16,7 +16,7 @@ from benchmarks.readers import FORMATS
 from benchmarks.suites import SUITES, Suite
 from benchmarks.trial import instance_of
 from benchmarks.verdicts import exposures
-from react_opt.errors import ReactError, UsageError
+from react_opt.errors import InputError, ReactError, UsageError
 from react_opt.interrupt import Interruption
 from react_opt.jobs import Record
 from react_opt.jobs_file import read_lines
@@ -98,7 +98,13 @@ def bench(suite: Suite, settings: runner.Settings, results: str, reports: Sequen
 
 
 def _finished(results: str) -> set[str]:
-    return {line["key"] for line in read_lines(results) if "key" in line} if Path(results).exists() else set()
+    """Return the keys of the runs that a file holds; refuse one that holds something else before any work is done."""
+    if not Path(results).exists() or not Path(results).stat().st_size:
+        return set()
+    lines = read_lines(results)
+    if not lines or lines[0].get("kind") != runner.SCHEMA["kind"]:
+        raise InputError.single(results, "", "holds something else than results: expected another file, or none")
+    return {line["key"] for line in lines if "key" in line}
 
 
 def compare(other: str, mine: str) -> int:

@@ -122,7 +122,8 @@ def run_jobs(
         None for this machine; else the address of a Ray cluster (``auto`` for the one there is, ``local`` to start
         one here with ``workers`` places), whose machines must have the same packages installed.
     header
-        Written as a line of its own before the first new record, with the time in ``begun``.
+        Written as a line of its own before the first new record, with the time in ``begun``. Where it has a ``kind``,
+        a file that begins with another one is refused.
     on_record
         Called with each new record, in the calling thread.
     should_stop
@@ -142,7 +143,7 @@ def run_jobs(
         raise UsageError(f"jobs: expected different keys, found {next(k for k in keys if keys.count(k) > 1)!r} twice")
     if workers < 1 or reuse < 1:
         raise UsageError("jobs: expected at least one worker and one job per process")
-    with opened(file) as (handle, lines):
+    with opened(file, None if header is None else header.get("kind")) as (handle, lines):
         found = {line["key"]: Record(**line) for line in lines if "ending" in line}
         waiting = [job for job in jobs if job.key not in found]
         if waiting and header is not None:

@@ -29,15 +29,22 @@ def read_lines(file: str | os.PathLike[str]) -> list[dict[str, Any]]:
 
 
 @contextlib.contextmanager
-def opened(file: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, list[dict[str, Any]]]]:
+def opened(file: str | os.PathLike[str], kind: str | None = None) -> Iterator[tuple[BinaryIO, list[dict[str, Any]]]]:
     """Open a results file to append to, alone, and yield it with the lines that it holds.
+
+    Parameters
+    ----------
+    file
+        The file, which is made where there is none. Half a line at its end is cut off.
+    kind
+        What the first line says of its ``kind``; None for anything.
 
     Raises
     ------
     UsageError
         Where another process has it open.
     InputError
-        Where it cannot be read or written, or a line is no JSON object.
+        Where it cannot be read or written, or holds something else; it is then left as it was.
     """
     name = os.fspath(file)
     try:
@@ -52,6 +59,8 @@ def opened(file: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, list[dict[s
         handle.seek(0)
         content = handle.read()
         lines = _parsed(content, name)
+        if (content and not lines) or (lines and kind is not None and lines[0].get("kind") != kind):
+            raise InputError.single(name, "", "holds something else than results: expected another file, or none")
         handle.truncate(content.rfind(b"\n") + 1)
         yield handle, lines
 

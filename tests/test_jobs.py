@@ -115,6 +115,11 @@ def test_faults_are_named(tmp_path: Path) -> None:
     file.write_text('{"key": 1}\n[]\n')
     with pytest.raises(InputError, match="line 2: expected a JSON object"):
         run_jobs([job], file)
+    for other in ('{"kind": "oros"}\n', '{"kind": "oros"}', '{\n "kind": "oros"\n}\n'):
+        file.write_text(other)
+        with pytest.raises(InputError):
+            run_jobs([job], file, header={"kind": "trial"})
+        assert file.read_text() == other  # somebody else's file is left as it was
     with pytest.raises(InputError, match="cannot be written"):
         run_jobs([job], tmp_path / "no" / "r.jsonl")
 

@@ -186,6 +186,11 @@ def test_what_cannot_be_run_is_said(tmp_path: Path) -> None:
     (tmp_path / "empty.py").write_text("")
     with pytest.raises(InputError, match="registers no solver"):
         runner.jobs_of(SUITES["smoke"], runner.Settings(peer_files=(str(tmp_path / "empty.py"),)))
+    plan = tmp_path / "plan.json"
+    plan.write_text('{"kind": "oros_plan"}')
+    with pytest.raises(InputError, match="holds something else than results"):
+        command.bench(SUITES["smoke"], runner.Settings(), str(plan), [])
+    assert plan.read_text() == '{"kind": "oros_plan"}'
     (tmp_path / "r.jsonl").write_text("{}\n")
     with pytest.raises(InputError, match="expected results of react-opt bench"):
         report.of_file(tmp_path / "r.jsonl")
