@@ -230,6 +230,7 @@ class Areas:
     def _make_targets(self, counted: Bools, reached: Bools) -> None:
         map_ = self._map
         side_m = map_.k * map_.frame.resolution_m
+        open_ = map_.deep | ((map_.known > 0) & (map_.solid == 0))
         found: dict[str, LocalTarget] = {}
         for area in self._list:
             for label, row in zip(area.labels, area.stats, strict=True):
@@ -242,7 +243,7 @@ class Areas:
                 stand = -1
                 if row[FRONTIER] > 0:
                     stand = stand_for(
-                        self._labels, label, area.window, map_.known, map_.solid, reached, self._range_blocks
+                        self._labels, label, area.window, centre[1], centre[0], open_, reached, self._range_blocks
                     )
                 opening = unknown_around(self._labels, counted, centre[1], centre[0], self._range_blocks, label)
                 x, y = map_.to_world((np.array(centre) + 0.5) * map_.k)

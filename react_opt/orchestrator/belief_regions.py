@@ -162,14 +162,14 @@ def flood(passable: Bools, starts: IntArray) -> Bools:
 
 
 @kernel
-def sight(solid: Grid16, r0: int, c0: int, r1: int, c1: int) -> bool:
-    """Tell whether nothing solid lies between the centres of two blocks (their own blocks do not count)."""
+def sight(open_: Bools, r0: int, c0: int, r1: int, c1: int) -> bool:
+    """Tell whether only open blocks lie between the centres of two blocks (their own blocks do not count)."""
     dr, dc = r1 - r0, c1 - c0
     pieces = 2 * max(abs(dr), abs(dc)) + 1
     for n in range(1, pieces):
         r = int(r0 + dr * n / pieces + 0.5)
         c = int(c0 + dc * n / pieces + 0.5)
-        if solid[r, c] > 0 and not ((r == r0 and c == c0) or (r == r1 and c == c1)):
+        if not open_[r, c] and not ((r == r0 and c == c0) or (r == r1 and c == c1)):
             return False
     return True
 
@@ -179,45 +179,43 @@ def stand_for(
     labels: Labels,
     region: int,
     window: IntArray,
-    known: Grid16,
-    solid: Grid16,
+    row: float,
+    col: float,
+    open_: Bools,
     reached: Bools,
     range_blocks: float,
 ) -> int:
-    """Return the reached block nearest to a region's frontier from which that frontier is in sight, -1 for none.
+    """Return the reached block from which a region is best looked at, -1 for none.
 
-    Nearest by the way through known free blocks: a breadth-first search from all of the frontier at once.
+    A breadth-first search spreads from the region's block nearest to its centroid (``row``, ``col``) through open
+    blocks (known free or deep) until it meets a block that a robot reaches and from which the part of the region that
+    the search came through is in sight: the centroid made accessible.
     """
     rows, cols = labels.shape
     reach = int(range_blocks)
     top, bottom = max(0, window[0] - reach), min(rows, window[1] + reach)
     left, right = max(0, window[2] - reach), min(cols, window[3] + reach)
     height, width = bottom - top, right - left
-    source = np.full(height * width, -1, dtype=np.int32)
-    queue = np.empty(height * width, dtype=np.int32)
-    head, tail = 0, 0
+    best, start = np.inf, -1
     for r in range(window[0], window[1]):
         for c in range(window[2], window[3]):
-            if labels[r, c] != region:
-                continue
-            for n in range(4):
-                p = r + (1 if n == 0 else -1 if n == 1 else 0)
-                q = c + (1 if n == 2 else -1 if n == 3 else 0)
-                if p < top or q < left or p >= bottom or q >= right or not free_block(known, solid, p, q):
-                    continue
-                at = (p - top) * width + (q - left)
-                if source[at] < 0:
-                    source[at] = (r - top) * width + (c - left)
-                    queue[tail] = at
-                    tail += 1
+            gap = (r - row) ** 2 + (c - col) ** 2
+            if labels[r, c] == region and gap < best:
+                best, start = gap, (r - top) * width + (c - left)
+    source = np.full(height * width, -1, dtype=np.int32)
+    queue = np.empty(height * width, dtype=np.int32)
+    source[start], queue[0] = start, start
+    head, tail = 0, 1
     while head < tail:
         at = queue[head]
         head += 1
         r, c = top + at // width, left + at % width
+        if labels[r, c] == region:
+            source[at] = at
         sr, sc = top + source[at] // width, left + source[at] % width
         if (r - sr) ** 2 + (c - sc) ** 2 > range_blocks * range_blocks:
             continue
-        if reached[r, c] and sight(solid, r, c, sr, sc):
+        if reached[r, c] and sight(open_, r, c, sr, sc):
             return int(r * cols + c)
         for n in range(4):
             p = r + (1 if n == 0 else -1 if n == 1 else 0)
@@ -225,7 +223,7 @@ def stand_for(
             if p < top or q < left or p >= bottom or q >= right:
                 continue
             there = (p - top) * width + (q - left)
-            if source[there] < 0 and free_block(known, solid, p, q):
+            if source[there] < 0 and open_[p, q]:
                 source[there] = source[at]
                 queue[tail] = there
                 tail += 1

@@ -199,6 +199,11 @@ class FleetBelief:
                 times[n], energies[n] = self._read(profile, field, points, False)
         return times, energies
 
+    def way_open(self, robot: RobotView, points_m: ArrayLike) -> bool:
+        """Tell whether a robot can still drive through ``(n, 2)`` points, unknown space taken as free."""
+        room = self.clearance_m(points_m) >= robot.profile.radius_m - 0.5 * self._side_m
+        return bool(room.all())
+
     def detour(
         self, robot: RobotView, goal_m: tuple[float, float], blocked: ArrayLike, slower: ArrayLike
     ) -> tuple[float, tuple[tuple[float, float], ...]]:

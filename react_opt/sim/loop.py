@@ -24,7 +24,7 @@ from react_opt.sim.link import Channel
 from react_opt.sim.news import News
 from react_opt.sim.record import Recorder
 from react_opt.sim.robot import SimRobot
-from react_opt.sim.rules import Rules
+from react_opt.sim.rules import Rules, sampled
 from react_opt.sim.sensing import Lidars
 from react_opt.sim.traffic import Traffic
 from react_opt.sim.world import World
@@ -34,6 +34,8 @@ TICK_S = 0.125
 SCAN_S = 0.25
 DECIDE_S = 1.0
 RULES_S = 0.25
+REPLAN_S = 0.5
+_LOOK_M = 4.0  # so far ahead a robot looks whether its way is still open
 FRAME_S = 1.0
 _PROGRESS_M = 0.3  # a robot that has not moved so far for stuck_s is stuck
 _CHARGE_M = 0.5  # a robot charges when it stands within this of a charger
@@ -136,6 +138,8 @@ class Simulation:
         if self._over():
             self._end()
             return
+        if self._every(REPLAN_S):
+            self._clocked("drive", self._keep_to_open_ways)
         if self.rules is not None and len(self.robots) > 1 and self._every(RULES_S):
             self._clocked("traffic", self._apply_rules)
         self._clocked("drive", self._drive)
@@ -228,8 +232,7 @@ class Simulation:
         if robot.yields_to is not None and order.path_m:
             return  # it goes on with its new order when the other robot has passed
         robot.yields_to = None
-        pixels = self.world.map.world_to_pixel(np.array(order.path_m).reshape(-1, 2)) * self.world.map.resolution_m
-        robot.follow([(float(u), float(v)) for u, v in pixels])
+        robot.follow(self._on_grid(tuple(order.path_m)))
         if robot.state != "driving" or not robot.path:
             robot.anchor = (robot.u_m, robot.v_m, self.t_s)
         robot.state = "driving" if robot.path else "idle"
@@ -241,6 +244,30 @@ class Simulation:
             robot.id, robot.profile, float(x), float(y), robot.heading_rad + self.world.map.origin_yaw_rad,
             robot.battery_j, "yielding" if robot.yields_to else robot.state, robot.target, robot.sensing, self.t_s,
         )  # fmt: skip
+
+    def _keep_to_open_ways(self) -> None:
+        """Let robots whose way turns out to be blocked find another one to the same end, or stop where there is none."""
+        unit = self.world.map.resolution_m
+        for robot in self.robots:
+            if not robot.alive or not robot.path or robot.order is None or not robot.order.path_m:
+                continue
+            points = sampled([(robot.u_m, robot.v_m), *robot.path], unit, _LOOK_M)[2:]
+            view = self._view(robot)
+            if self.belief.way_open(view, self.world.map.pixel_to_world(points / unit)):
+                continue
+            goal = robot.order.path_m[-1]
+            path = self.belief.path(view, goal) or self.belief.path(view, goal, optimistic=True)
+            robot.yields_to = None
+            robot.follow(self._on_grid(path))
+            if not path:
+                robot.state = "stuck"
+                self.record.event(self.t_s, "robot_stuck", robot=robot.id, target=robot.target, reason="no way is left")
+                self._news = True
+
+    def _on_grid(self, path_m: tuple[tuple[float, float], ...]) -> list[tuple[float, float]]:
+        unit = self.world.map.resolution_m
+        pixels = self.world.map.world_to_pixel(np.array(path_m, dtype=np.float64).reshape(-1, 2)) * unit
+        return [(float(u), float(v)) for u, v in pixels]
 
     def _apply_rules(self) -> None:
         assert self.rules is not None

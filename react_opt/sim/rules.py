@@ -5,8 +5,8 @@ Robots tell each other where they are and where they are going. Four times a sec
 1. **Narrow passages are reserved.** A stretch of a robot's way where two robots cannot pass each other belongs to the
    first robot that comes within :data:`CLAIM_M` of it (in the mission's order where several come at once), until it
    has left it. Robots that go the same way may follow; one that would come against it waits before the entry.
-2. **Who follows keeps its distance.** A robot whose way is taken by one that drives the same way brakes behind it;
-   one that stands still for more than :data:`PATIENCE_S` is no longer followed but met.
+2. **Who follows keeps its distance.** A robot whose way is taken by one that drives, and not towards it, brakes behind
+   that one; when that one stands still for more than :data:`PATIENCE_S`, it is no longer followed but met.
 3. **Who meets another, one of the two makes way.** Priority, from the highest: a robot that another one makes way for
    stands above all that the other meets (so priority is handed on along a queue); a robot inside a reserved passage
    before one outside; a driving one before a standing one; the earlier in the mission's order. The lower one
@@ -195,19 +195,18 @@ class Rules:
                 continue  # nobody there, or it drives away from the other
             at = int(ahead[0])
             self._cap(robot, at * _SAMPLE_M)
-            if self._follows(near, at, other) and t_s < self._still[other.id] + PATIENCE_S:
+            if self._goes_its_way(robot, other) and t_s < self._still[other.id] + PATIENCE_S:
                 continue
             self._meet(robot, other, t_s, views)
 
-    def _follows(self, way: Points, at: int, other: SimRobot) -> bool:
-        """Tell whether another robot drives the way that leads to it."""
+    def _goes_its_way(self, robot: SimRobot, other: SimRobot) -> bool:
+        """Tell whether another robot drives, and not towards this one."""
         theirs = self._ways.get(other.id)
-        if theirs is None or len(theirs) < 4:
+        if theirs is None or not other.path:
             return False
-        step = way[min(at + 3, len(way) - 1)] - way[max(at - 3, 0)]
-        ahead = theirs[min(6, len(theirs) - 1)] - theirs[0]
-        norm = hypot(*step) * hypot(*ahead)
-        return norm > 0 and float(step @ ahead) / norm > 0.3
+        gaps = np.hypot(theirs[:, 0] - robot.u_m, theirs[:, 1] - robot.v_m)[: int(LOOK_M / _SAMPLE_M) + 1]
+        touch = robot.profile.radius_m + other.profile.radius_m + TOUCH_M
+        return bool(gaps.min() > min(touch, gaps[0] - 0.002))
 
     def _rank(self, robot: SimRobot) -> tuple[int, ...]:
         """Return a robot's priority; smaller goes first. One that makes way ranks just below whom it makes way for."""
