@@ -121,7 +121,7 @@ class Belief(Protocol):
 
     @property
     def map(self) -> OccupancyMap:
-        """The merged map."""
+        """The merged map; beyond the areas, what has not been seen counts as occupied."""
         ...
 
     @property

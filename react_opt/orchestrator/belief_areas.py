@@ -21,6 +21,7 @@ from react_opt.orchestrator.belief_regions import (
     SUM_ROW,
     IntArray,
     label_window,
+    missed_pixels,
     provably_unseen,
     stand_for,
     touching,
@@ -46,6 +47,7 @@ class _Area:
     labels: range = range(0)
     stats: IntArray = field(default_factory=lambda: np.zeros((0, 5), dtype=np.int64))
     known: int = 0
+    missed: int = 0
     free: bool = False
     view: AreaView | None = None
 
@@ -205,6 +207,7 @@ class Areas:
         area.labels = range(first, first + count)
         r0, r1, c0, c1 = area.window
         area.known = int(map_.known[r0:r1, c0:c1].sum())
+        area.missed = missed_pixels(map_.deep, map_.known, map_.solid, area.window, map_.k**2)
         area.free = bool(((map_.known[r0:r1, c0:c1] > 0) & (map_.solid[r0:r1, c0:c1] == 0)).any())
 
     def _counted(self) -> Bools:
@@ -269,7 +272,7 @@ class Areas:
         map_ = self._map
         labels = np.array(area.labels, dtype=np.int64)
         unknown = int(area.stats[counted[labels], SIZE].sum()) * map_.k**2 if len(labels) else 0
-        share = area.known / (area.known + unknown) if area.known else 0.0
+        share = area.known / (area.known + unknown + area.missed) if area.known else 0.0
         centre = (self._origin + (np.array((area.a, area.b)) + 0.5) * self._side) - (map_.col0, map_.row0)
         x, y = map_.to_world(centre)
         stand = _nearest(reached, area.window, centre[1] / map_.k, centre[0] / map_.k)

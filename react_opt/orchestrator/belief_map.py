@@ -146,9 +146,11 @@ class BeliefMap:
         self.touched[:] = True
 
     def merged(self) -> OccupancyMap:
-        """Return the map as observed."""
+        """Return the map as observed; what lies beyond the areas and has not been seen counts as occupied."""
         x, y = self.frame.pixel_to_world((self.col0, self.row0))
         seen = np.where(self.cells == PRIOR_OCCUPIED, UNKNOWN, self.cells).astype(np.uint8)
+        beyond = np.repeat(np.repeat(~self.inside, self.k, axis=0), self.k, axis=1)
+        seen[beyond & (seen == UNKNOWN)] = OCCUPIED
         return OccupancyMap(seen, self.frame.resolution_m, float(x), float(y), self.frame.origin_yaw_rad)
 
     def to_canvas(self, points_m: ArrayLike) -> FloatArray:

@@ -92,6 +92,33 @@ def label_window(
 
 
 @kernel
+def missed_pixels(deep: Bools, known: Grid16, solid: Grid16, window: IntArray, per_block: int) -> int:
+    """Count the unknown pixels of an area that lie between rays in known free space: in no region, but unknown.
+
+    Those of blocks that are known in part and hold nothing solid, and whole blocks that are not deep with known free
+    ones on at least two sides. (A block missing in a wall's face has one on one side only.)
+    """
+    rows, cols = deep.shape
+    count = 0
+    for r in range(window[0], window[1]):
+        for c in range(window[2], window[3]):
+            if deep[r, c] or solid[r, c] > 0:
+                continue
+            if known[r, c] > 0:
+                count += per_block - known[r, c]
+                continue
+            sides = 0
+            for n in range(4):
+                p = r + (1 if n == 0 else -1 if n == 1 else 0)
+                q = c + (1 if n == 2 else -1 if n == 3 else 0)
+                if 0 <= p < rows and 0 <= q < cols and free_block(known, solid, p, q):
+                    sides += 1
+            if sides >= 2:
+                count += per_block
+    return count
+
+
+@kernel
 def _most_common(old: Labels, members: IntArray, width: int) -> int:
     """Return the old region of the strict majority of what had one (Boyer-Moore), else that of the last survivor."""
     best, votes = -1, 0

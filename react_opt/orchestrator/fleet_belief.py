@@ -138,7 +138,8 @@ class FleetBelief:
 
     @property
     def map(self) -> OccupancyMap:
-        """The merged map as observed."""
+        """The merged map as observed; beyond the areas, what has not been seen counts as occupied."""
+        self._areas.fit()
         return self._map.merged()
 
     @property

@@ -246,7 +246,7 @@ class Simulation:
         )  # fmt: skip
 
     def _keep_to_open_ways(self) -> None:
-        """Let robots whose way turns out to be blocked find another one to the same end, or stop where there is none."""
+        """Let robots whose way turns out blocked find another one to the same end, or stop where there is none."""
         unit = self.world.map.resolution_m
         for robot in self.robots:
             if not robot.alive or not robot.path or robot.order is None or not robot.order.path_m:

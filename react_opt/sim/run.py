@@ -104,12 +104,11 @@ def simulate(
 
 def _compare(before: Trace, trace: Trace) -> None:
     """Raise where a trace does not go on from another one."""
-    frames, events = len(before.frames), len(before.events)
-    if before.status == "finished":
-        same = before.frames == trace.frames and before.events == trace.events
-    elif len(trace.frames) < frames:  # stopped again, earlier
-        same = before.frames[: len(trace.frames)] == trace.frames
-    else:
-        same = before.frames == trace.frames[:frames] and before.events == trace.events[:events]
-    if not same:
-        raise ReactError("--resume: the recorded part cannot be reproduced; was it made by another version?")
+    theirs, ours = (
+        [[part.model_dump(mode="json") for part in parts] for parts in (one.frames, one.events)]
+        for one in (before, trace)
+    )
+    for old, new in zip(theirs, ours, strict=True):
+        shared = min(len(old), len(new)) if before.status == "stopped" else max(len(old), len(new))
+        if old[:shared] != new[:shared]:
+            raise ReactError("--resume: the recorded part cannot be reproduced; was it made by another version?")

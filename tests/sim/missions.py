@@ -52,7 +52,7 @@ def mission(starts: list[tuple[float, float]], **changes: Any) -> Mission:
         "step_s": 6.0,
         "profiles": {"jackal": JACKAL},
         "robots": tuple(FleetRobot(id=f"r{n + 1}", profile="jackal", x_m=x, y_m=y) for n, (x, y) in enumerate(starts)),
-        "delta": 0.95,
+        "delta": 0.98,
         "strategy": "nearest",
         "postpone_below": 0.1,
         "seed": 1,

@@ -50,12 +50,12 @@ def test_batteries_never_rise_and_seen_pixels_are_never_unseen() -> None:
 
 def test_a_robot_dies_and_the_other_goes_on() -> None:
     trace = Simulation(
-        mission([(1.5, 1.5), (1.5, 4.0)], failures=[{"robot": "r1", "t_s": 8.0}], horizon_s=90.0), TWO_ROOMS
+        mission([(1.5, 1.5), (1.5, 4.0)], failures=[{"robot": "r1", "t_s": 3.0}], horizon_s=90.0), TWO_ROOMS
     ).run()
     dead = [(event.t_s, event.robot) for event in trace.events if event.type == "robot_dead"]
-    assert dead == [(8.0, "r1")]
+    assert dead == [(3.0, "r1")]
     assert trace.frames[-1].coverage > 0.97
-    places = {(frame.robots[0].x_m, frame.robots[0].y_m) for frame in trace.frames if frame.t_s >= 8}
+    places = {(frame.robots[0].x_m, frame.robots[0].y_m) for frame in trace.frames if frame.t_s >= 3}
     assert len(places) == 1
 
 

@@ -44,7 +44,7 @@ def stop_after(polls: int) -> Any:
     return lambda: next(left, None) is None
 
 
-@pytest.mark.parametrize("ticks", np.random.default_rng(7).integers(1, 130, size=4).tolist())
+@pytest.mark.parametrize("ticks", np.random.default_rng(7).integers(1, 100, size=4).tolist())
 def test_stopped_at_any_tick_and_resumed_gives_the_same_trace(folder: Path, ticks: int) -> None:
     whole = simulate(MISSION, folder)
     stopped = simulate(MISSION, folder, should_stop=stop_after(ticks))
