@@ -9,7 +9,7 @@ import numpy as np
 
 from react_opt.certify_assignment import OPTIMAL_GAP, check_assignment
 from react_opt.claims import instance_ref, versions
-from react_opt.errors import InputError, ReactError, UsageError
+from react_opt.errors import UsageError
 from react_opt.instance import AssignmentInstance
 from react_opt.models.assignment import (
     AssignmentModel,
@@ -24,6 +24,7 @@ from react_opt.options import SolveOptions
 from react_opt.plan import Assigned, AssignmentPlan, Claim, Deferred, Plan, gap_of
 from react_opt.solvers.assignment.exact import Assignment, assign, solve_arrays, value_step
 from react_opt.solvers.assignment.explain import Reason, reasons, with_losses
+from react_opt.solvers.stated import Statement, require_start
 
 __all__ = ["Assignment", "assign", "solve_assignment"]
 
@@ -48,16 +49,13 @@ def solve_assignment(instance: AssignmentInstance, options: SolveOptions, start:
     if options.method == "routes":
         raise UsageError("method: an assignment has no routes; expected auto or monolith")
     model = build(instance)
-    known = None if start is None else _started(instance, model, start)
-    wall_s = {"build": time.perf_counter() - options.begun}
-    begun = time.perf_counter()
-    monolith = options.method == "monolith" or options.solver is not None
-    if monolith:
-        answer, facts = _monolith(model, options, known, "asked for")
+    known = None if start is None else _started(model, require_start(instance, start, AssignmentPlan, check_assignment))
+    statement = Statement(instance, options, check_assignment)
+    if options.method == "monolith" or options.solver is not None:
+        answer, found_with = _monolith(model, options, known, "asked for")
     else:
-        answer, facts = _own(model, options, known)
-    wall_s["solve"] = time.perf_counter() - begun
-    begun = time.perf_counter()
+        answer, found_with = _own(model, options, known)
+    statement.phase_done("solve")
     # A search that was stopped proves no more than it says: large gains would hide whole units in a relative gap.
     allowed = OPTIMAL_GAP if answer.limit == "none" else CLOSED_GAP
     optimal = answer.bound - answer.objective <= allowed * abs(answer.objective)
@@ -65,46 +63,34 @@ def solve_assignment(instance: AssignmentInstance, options: SolveOptions, start:
         why = with_losses(model, answer.robot_of, answer.objective, options.deadline, options.should_stop)
     else:
         why = reasons(model, answer.robot_of)
-    wall_s["explain"] = time.perf_counter() - begun
+    statement.phase_done("explain")
     claim = Claim(
         status="optimal" if optimal else "feasible",
         objective=answer.objective,
         bound=answer.bound,
         gap=gap_of(answer.objective, answer.bound),
         limit="none" if optimal else answer.limit,
-        seed=options.seed,
-        threads=options.threads,
-        wall_s=wall_s,
-        **facts,
+        **statement.facts(**found_with),
     )
-    plan = AssignmentPlan(
-        instance=instance_ref(instance),
-        claim=claim,
-        assigned=tuple(
-            Assigned(robot=model.robots[answer.robot_of[k]], target=model.targets[k])
-            for k in np.flatnonzero(answer.robot_of >= 0).tolist()
-        ),
-        deferred=tuple(_deferred(model, row) for row in why),
+    return statement.checked(
+        AssignmentPlan(
+            instance=instance_ref(instance),
+            claim=claim,
+            assigned=tuple(
+                Assigned(robot=model.robots[answer.robot_of[k]], target=model.targets[k])
+                for k in np.flatnonzero(answer.robot_of >= 0).tolist()
+            ),
+            deferred=tuple(_deferred(model, row) for row in why),
+        )
     )
-    begun = time.perf_counter()
-    found = check_assignment(instance, plan)
-    if not found.ok:
-        raise ReactError(f"no plan passed the checker; please report this: {found.violations[0]}")
-    wall_s = {**wall_s, "check": time.perf_counter() - begun}
-    return plan.model_copy(update={"claim": claim.model_copy(update={"wall_s": wall_s})})
 
 
 def _deferred(model: AssignmentModel, row: Reason) -> Deferred:
     return Deferred(target=model.targets[row.target], reason=row.reason, loss=row.loss)
 
 
-def _started(instance: AssignmentInstance, model: AssignmentModel, start: Plan) -> IntArray:
-    """Return the assignment of a plan that the checker accepts."""
-    if not isinstance(start, AssignmentPlan):
-        raise InputError.single("<start>", "kind", f"expected an assignment_plan, found {start.kind!r}")
-    found = check_assignment(instance, start)
-    if not found.ok:
-        raise InputError.single("<start>", "", f"expected a valid plan of this instance: {found.violations[0]}")
+def _started(model: AssignmentModel, start: AssignmentPlan) -> IntArray:
+    """Return the assignment of a plan."""
     robot = {name: index for index, name in enumerate(model.robots)}
     column = {name: index for index, name in enumerate(model.targets)}
     known = np.full(len(model.targets), -1, dtype=np.int64)
@@ -130,7 +116,7 @@ def _own(model: AssignmentModel, options: SolveOptions, known: IntArray | None) 
         "method": name,
         "solver": "scipy" if plain else "react_opt",
         "versions": versions("numpy", "scipy", "numba"),
-        "settings": {**_settings(options), "relaxations": answer.work},
+        "settings": {"relaxations": answer.work},
     }
     if answer.limit != "time" or not hand_over or options.left_s() == 0.0:
         return answer, facts
@@ -168,7 +154,7 @@ def _monolith(
     )
     outcome = chosen.solve(mathematics, request)
     robot_of = known if known is not None else np.full(len(model.targets), -1, dtype=np.int64)
-    settings = {**_settings(options), **outcome.settings}
+    settings = dict(outcome.settings)
     if outcome.x is not None:
         found = robot_of_targets(mathematics, outcome.x, len(model.targets))
         if not is_feasible(model.arrays, found):
@@ -187,7 +173,3 @@ def _monolith(
         "settings": settings,
     }
     return Assignment(robot_of, objective, bound, outcome.limit, 0, False), facts
-
-
-def _settings(options: SolveOptions) -> dict[str, Any]:
-    return {"time_limit_s": options.time_limit_s, "work_limit": options.work_limit, "gap": options.gap}

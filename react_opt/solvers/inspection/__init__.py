@@ -7,7 +7,6 @@ from typing import Any
 
 from react_opt.certify_inspection import OPTIMAL_GAP, check_inspection
 from react_opt.claims import instance_ref, versions
-from react_opt.errors import InputError, ReactError
 from react_opt.instance import InspectionInstance
 from react_opt.models.inspection import InspectionArrays, InspectionModel, Routes, build
 from react_opt.options import SolveOptions
@@ -28,6 +27,7 @@ from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.decompose import Decomposition
 from react_opt.solvers.inspection.explain import Reason, reasons, with_losses
 from react_opt.solvers.inspection.whole import solve_whole
+from react_opt.solvers.stated import Statement, require_start
 
 __all__ = ["Gate", "gate", "inspect", "simple_rule", "solve_inspection"]
 
@@ -82,17 +82,13 @@ def solve_inspection(instance: InspectionInstance, options: SolveOptions, start:
     """
     model = build(instance)
     reserve_s = CHECK_S + CHECK_ROW_S * len(instance.travel)
-    known = None if start is None else _started(instance, model, start)
-    wall_s = {"build": time.perf_counter() - options.begun}
-    begun = time.perf_counter()
-    settings: dict[str, Any] = {
-        "time_limit_s": options.time_limit_s, "work_limit": options.work_limit, "gap": options.gap,
-    }  # fmt: skip
+    known = None if start is None else _started(model, require_start(instance, start, InspectionPlan, check_inspection))
+    statement = Statement(instance, options, check_inspection)
+    settings: dict[str, Any]
     if options.method == "monolith" or (options.solver is not None and options.method == "auto"):
-        answer, limit, solver, version, more = solve_whole(model.arrays, options, known)
+        answer, limit, solver, version, settings = solve_whole(model.arrays, options, known)
         method = "monolith: asked for" if options.method == "monolith" else f"monolith: solver {solver} was asked for"
         found_with = {**versions("numpy", "scipy"), solver: version}
-        settings.update(more)
     else:
         answer, control = inspect(model.arrays, options, known, reserve_s)
         limit = control.limit
@@ -100,15 +96,11 @@ def solve_inspection(instance: InspectionInstance, options: SolveOptions, start:
             limit = "memory"
         method, solver = "routes", "react_opt with highs"
         found_with = versions("numpy", "scipy", "numba", "highspy")
-        settings.update(answer.notes)
-    wall_s["solve"] = time.perf_counter() - begun
-    facts: dict[str, Any] = {
-        "method": method, "solver": solver, "versions": found_with, "seed": options.seed, "threads": options.threads,
-        "settings": settings,
-    }  # fmt: skip
+        settings = dict(answer.notes)
+    statement.phase_done("solve")
     if answer.routes is None:
-        return _without_plan(instance, model, answer, limit, {**facts, "wall_s": wall_s})
-    begun = time.perf_counter()
+        facts = statement.facts(method, solver, found_with, settings)
+        return statement.checked(_without_plan(instance, model, answer, limit, facts))
     optimal = answer.value_bound - answer.value <= OPTIMAL_GAP * abs(answer.value)
     if options.explain and optimal:
         deadline = None if options.deadline is None else options.deadline - reserve_s
@@ -116,7 +108,7 @@ def solve_inspection(instance: InspectionInstance, options: SolveOptions, start:
             why = with_losses(model.arrays, answer.routes, answer.value, left, options.seed)
     else:
         why = reasons(model.arrays, answer.routes)
-    wall_s["explain"] = time.perf_counter() - begun
+    statement.phase_done("explain")
     best = (
         optimal
         and answer.cost_bound is not None
@@ -128,30 +120,18 @@ def solve_inspection(instance: InspectionInstance, options: SolveOptions, start:
         bound=max(answer.value_bound, answer.value),
         gap=gap_of(answer.value, max(answer.value_bound, answer.value)),
         limit="none" if optimal and best else limit,
-        wall_s=wall_s,
         secondary=Secondary(
             objective=answer.cost,
             bound=None if answer.cost_bound is None or not optimal else min(answer.cost_bound, answer.cost),
             status="optimal" if best else "feasible",
         ),
-        **facts,
+        **statement.facts(method, solver, found_with, settings),
     )
-    plan = _filled(instance, model, answer.routes, claim, why)
-    begun = time.perf_counter()
-    found = check_inspection(instance, plan)
-    if not found.ok:
-        raise ReactError(f"no plan passed the checker; please report this: {found.violations[0]}")
-    wall_s = {**wall_s, "check": time.perf_counter() - begun}
-    return plan.model_copy(update={"claim": claim.model_copy(update={"wall_s": wall_s})})
+    return statement.checked(_filled(instance, model, answer.routes, claim, why))
 
 
-def _started(instance: InspectionInstance, model: InspectionModel, start: Plan) -> Routes:
-    """Return the routes of a plan that the checker accepts."""
-    if not isinstance(start, InspectionPlan):
-        raise InputError.single("<start>", "kind", f"expected an inspection_plan, found {start.kind!r}")
-    found = check_inspection(instance, start)
-    if not found.ok:
-        raise InputError.single("<start>", "", f"expected a valid plan of this instance: {found.violations[0]}")
+def _started(model: InspectionModel, start: InspectionPlan) -> Routes:
+    """Return the routes of a plan."""
     number = {name: index for index, name in enumerate(model.targets)}
     stops = {route.robot: [number[stop.target] for stop in route.stops] for route in start.routes}
     return [stops.get(name, []) for name in model.robots]
