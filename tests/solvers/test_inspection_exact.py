@@ -14,7 +14,7 @@ from react_opt.certify_inspection import check_inspection
 from react_opt.errors import InputError
 from react_opt.models.inspection import InspectionArrays, Routes, build
 from react_opt.options import SolveOptions
-from react_opt.solvers.inspection import gate, simple_rule, solve_inspection
+from react_opt.solvers.inspection import decompose, gate, pricing, simple_rule, solve_inspection
 from react_opt.solvers.inspection.answer import grid_of
 from react_opt.solvers.inspection.control import Control
 from react_opt.solvers.inspection.labels import ENUMERATE, EXACT, HEURISTIC
@@ -158,6 +158,23 @@ def test_the_monolith_agrees(seed: int) -> None:
         assert whole.claim.secondary is not None
         assert routes.claim.secondary is not None
         assert whole.claim.secondary.objective == pytest.approx(routes.claim.secondary.objective, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(0, 160, 5))
+def test_what_is_for_many_targets_is_exact_for_few(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Memories of one target, so that cycles do come up and must be forbidden one by one.
+    instance = random_instance(seed)
+    exact = solve_inspection(instance, SolveOptions(threads=1, explain=False)).claim
+    for module in (pricing, decompose):
+        monkeypatch.setattr(module, "ELEMENTARY_UP_TO", 0)
+    monkeypatch.setattr(pricing, "NEIGHBOURHOOD", 1)
+    found = solve_inspection(instance, SolveOptions(threads=1, explain=False, work_limit=400)).claim
+    assert found.status in (exact.status, "feasible")
+    if exact.status == "optimal":
+        assert found.objective == pytest.approx(exact.objective)
+        assert found.bound >= exact.objective - 1e-6
+        assert found.status == "optimal"
+        assert found.secondary.objective == pytest.approx(exact.secondary.objective, abs=1e-5)
 
 
 def larger(seed: int = 0, targets: int = 24, robots: int = 3, ends: bool = True) -> Any:
