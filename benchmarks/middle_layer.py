@@ -1,6 +1,6 @@
 """The middle layer's table: latencies of assignments and inspections, and PyVRP beside the large inspections.
 
-    python benchmarks/middle_layer.py [--seed 0] [--large 30] [--large-s 10] [--only NAME]
+    python benchmarks/middle_layer.py [--seed 0] [--large 30] [--large-s 10] [--results FILE] [--only NAME]
 
 Prints one line per row: what, how many, median, 99th percentile and largest wall time, and what was proven.
 Run it on an idle machine; latencies are of a warm process.
@@ -9,14 +9,17 @@ Run it on an idle machine; latencies are of a warm process.
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from react_opt import jsonio
+from react_opt import jsonio, solve
 from react_opt.models.assignment import AssignmentArrays, pair_values
 from react_opt.models.inspection import InspectionArrays, Routes, build
 from react_opt.options import SolveOptions
@@ -41,6 +44,29 @@ def assignment_case(rng: Any, robots: int, targets: int, conflicts: int, capacit
     pairs = np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
     limit = rng.integers(1, capacity + 1, robots)
     return AssignmentArrays(value, np.where(np.isneginf(value), 0.0, energy_j), budget, limit, pairs)
+
+
+def as_instance(case: AssignmentArrays) -> Any:
+    """The same problem as an instance: gains of a pair's value and more, the rest as time."""
+    robots, targets = case.value.shape
+    gain = np.maximum(case.value, 0.0).max(axis=0) + 1.0
+    rows = [(r, k) for r in range(robots) for k in range(targets) if np.isfinite(case.value[r, k])]
+    return jsonio.parse(
+        {
+            "kind": "assignment", "name": f"{robots} x {targets}", "weights": {"beta": 0.0},
+            "robots": [
+                {"id": f"r{r}", "battery_j": float(case.budget_j[r]), "capacity": int(case.capacity[r])}
+                for r in range(robots)
+            ],
+            "targets": [{"id": f"k{k}", "gain": float(gain[k])} for k in range(targets)],
+            "costs": [
+                {"robot": f"r{r}", "target": f"k{k}", "time_s": float(gain[k] - case.value[r, k]),
+                 "energy_j": float(case.energy_j[r, k])}
+                for r, k in rows
+            ],
+            "conflicts": [[f"k{a}", f"k{b}"] for a, b in case.conflicts.tolist()],
+        }
+    )  # fmt: skip
 
 
 def inspection_case(robots: int, targets: int, seed: int) -> Any:
@@ -130,19 +156,25 @@ def assignments(seed: int) -> None:
             return "optimal" if solve_arrays(cases[run]).limit == "none" else "feasible"
 
         timed(name, runs, once)
+        instances = [as_instance(case) for case in cases]
+
+        def whole(run: int, instances: list[Any] = instances) -> str:
+            return str(solve(instances[run], explain=False).claim.status)
+
+        timed("  the same through solve, checked", runs, whole)
 
 
 def plain(seed: int) -> None:
     rng = np.random.default_rng(seed)
     value = assignment_case(rng, 1000, 1000, 0, 1).value
     gain = np.maximum(value, 0.0)
-    for name, solve in (
+    for name, method in (
         ("plain assignment 1000 x 1000", linear_assignment),
         ("  scipy alone on the same values", lambda _: linear_sum_assignment(gain, maximize=True)),
     ):
 
-        def once(run: int, solve: Any = solve) -> str:
-            solve(value)
+        def once(run: int, method: Any = method) -> str:
+            method(value)
             return "optimal"
 
         timed(name, 7, once)
@@ -159,21 +191,35 @@ def inspections(seed: int) -> None:
         timed(f"inspection {robots} robots, {targets} targets", runs, once)
 
 
-def large(seed: int, runs: int, seconds: float) -> None:
-    ours, theirs, gaps = [], [], []
+def large(seed: int, runs: int, seconds: float, results: Path | None) -> None:
+    """Compare with PyVRP; with a file of results each run is written as it ends, and what is there is not repeated."""
+    done = {}
+    if results is not None and results.exists():
+        rows = [json.loads(line) for line in results.read_text().splitlines()]
+        done = {row["seed"]: row for row in rows if row["seconds"] == seconds}
     for run in range(runs):
+        if seed + run in done:
+            continue
         instance = inspection_case(4, 100, seed + run)
         arrays = build(instance).arrays
         plan = solve_inspection(instance, SolveOptions(time_limit_s=seconds, explain=False, seed=seed))
         routes = pyvrp_routes(arrays, seconds, seed)
         assert arrays.is_feasible(routes)
-        ours.append((plan.claim.objective or 0.0, plan.claim.secondary.objective if plan.claim.secondary else None))
-        theirs.append(arrays.worth(routes))
-        gaps.append(plan.claim.gap if plan.claim.gap is not None else np.nan)
-        print(f"  run {run}: react_opt {ours[-1]}  bound {plan.claim.bound}  PyVRP {theirs[-1]}", flush=True)
-    value = np.mean([row[0] for row in ours]), np.mean([row[0] for row in theirs])
-    print(f"inspection 4 robots, 100 targets, {seconds:g} s: mean value {value[0]:.2f}, PyVRP {value[1]:.2f}, "
-          f"mean gap {np.mean(gaps):.4f}", flush=True)  # fmt: skip
+        row = {
+            "seed": seed + run, "seconds": seconds, "value": plan.claim.objective, "bound": plan.claim.bound,
+            "pyvrp": arrays.worth(routes)[0], "load": os.getloadavg()[0],
+        }  # fmt: skip
+        done[seed + run] = row
+        print(f"  {row}", flush=True)
+        if results is not None:
+            with results.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+    rows = [done[seed + run] for run in range(runs)]
+    ours, theirs = np.array([row["value"] for row in rows]), np.array([row["pyvrp"] for row in rows])
+    gap = np.mean([(row["bound"] - row["value"]) / row["value"] for row in rows])
+    print(f"inspection 4 robots, 100 targets, {seconds:g} s, {runs} runs: mean value {ours.mean():.2f}, PyVRP "
+          f"{theirs.mean():.2f} (better {(ours > theirs).sum()}, equal {(ours == theirs).sum()}, worse "
+          f"{(ours < theirs).sum()}), mean gap {gap:.4f}", flush=True)  # fmt: skip
 
 
 def main() -> None:
@@ -181,13 +227,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--large", type=int, default=30, help="runs of 4 robots and 100 targets")
     parser.add_argument("--large-s", type=float, default=10.0, help="seconds for each of them")
+    parser.add_argument("--results", type=Path, help="file of one line per large run, to go on from")
     parser.add_argument("--only", choices=("assignments", "plain", "inspections", "large"))
     options = parser.parse_args()
     rows = {
         "assignments": lambda: assignments(options.seed),
         "plain": lambda: plain(options.seed),
         "inspections": lambda: inspections(options.seed),
-        "large": lambda: large(options.seed, options.large, options.large_s),
+        "large": lambda: large(options.seed, options.large, options.large_s, options.results),
     }
     for name, row in rows.items():
         if options.only in (None, name):
