@@ -133,7 +133,7 @@ def coverage_by_robots(groups: Mapping[tuple[str, int], Sequence[Trace]]) -> Fig
             axes.fill_between(times, mean - spread, mean + spread, color=tint(colour, 0.25), linewidth=0, zorder=1)
             axes.plot(times, mean, color=colour, linestyle=style, linewidth=1.4, label=_count(robots), zorder=2)
         _coverage_axes(axes)
-        axes.set_title(f"{strategy}: mean ± standard deviation of {seeds} {'run' if seeds == 1 else 'runs'}")
+        axes.set_title(f"{strategy}: " + ("one run" if seeds == 1 else f"mean ± standard deviation of {seeds} runs"))
     for axes in panels[1:]:
         axes.set_ylabel("")
     panels[-1].legend(loc="lower right")
