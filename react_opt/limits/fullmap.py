@@ -7,6 +7,7 @@ and the time is what the simulator measures, with the sensors on all the time an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import hypot
 
 import numpy as np
@@ -142,7 +143,6 @@ def _search(
     mission: Mission, seen: Outlook, share: float, margin: float, steps: int, seed: int
 ) -> list[tuple[float, dict[str, tuple[Point, ...]]]]:
     """Return when a team is expected to have seen a share, s, and its paths: as searched, and with corners cut."""
-    robots = len(mission.robots)
     places = np.array([(robot.x_m, robot.y_m) for robot in mission.robots])
     apart = np.hypot(*(seen.points_m[:, None, :] - places[None, :, :]).transpose(2, 0, 1))
     starts = len(apart) - 1 - np.argmin(apart[::-1], axis=0)
@@ -209,7 +209,7 @@ def _straightened(
             cuts.append(at)
     cuts.append(len(nodes) - 1)
     points: list[Point] = []
-    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+    for first, last in pairwise(cuts):
         if last > first:
             leg = pull_straight(seen.space.padded, field, pixels[first : last + 1], True, 1 / profile.turn_rad_s)
             points += [(float(x), float(y)) for x, y in seen.space.to_world(leg[1:])]

@@ -105,7 +105,7 @@ def _standing_points(space: FreeSpace, profile: RobotProfile, starts_m: FloatArr
 
 
 def _nooks(world: World, space: FreeSpace, profile: RobotProfile) -> FloatArray:
-    """Return the places nearest to the walls, a spacing apart, where the robots fit: what is hidden shows from there."""
+    """Return the places nearest to the walls, a spacing apart, where robots fit: what is hidden shows from there."""
     clear = space.clearance_m
     tight = np.maximum(np.maximum(clear[:-1, :-1], clear[:-1, 1:]), np.maximum(clear[1:, :-1], clear[1:, 1:]))
     side = SPACING_M / space.resolution_m

@@ -1,8 +1,8 @@
 """Routes of a team through standing points that see a share of a known building early: simulated annealing.
 
 A solution is a list of points to visit per robot; robots drive the fastest ways between them and scan at every point
-they come by. Its worth is the time at which the team has seen the share wanted, turns and stops included. Moves: insert,
-drop, replace (often by a point near by), move to another place or robot, exchange, and reverse a stretch
+they come by. Its worth is the time at which the team has seen the share wanted, turns and stops included. Moves:
+insert, drop, replace (often by a point near by), move to another place or robot, exchange, and reverse a stretch
 (Kirkpatrick, Gelatt and Vecchi 1983; the neighbourhoods are those of vehicle routing).
 """
 
@@ -103,7 +103,7 @@ def seen_s(
             if at[r] < size[r] and (best < 0 or at_s[r, at[r]] < at_s[best, at[best]]):
                 best = r
         if best < 0:
-            return clock + _PENALTY_S * (needed - total) / needed
+            return float(clock + _PENALTY_S * (needed - total) / needed)
         k, clock = node[best, at[best]], at_s[best, at[best]]
         at[best] += 1
         for w in range(words):
@@ -112,7 +112,7 @@ def seen_s(
                 total += popcount(new)
                 seen[w] |= new
         if total >= needed:
-            return clock
+            return float(clock)
 
 
 @kernel

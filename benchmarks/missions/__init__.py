@@ -1,0 +1,1 @@
+"""Campaigns of simulated missions and the tables made of them (``python -m benchmarks.missions``)."""
