@@ -68,8 +68,9 @@ def run(line, monkeypatch, capsys):
             main()
         captured = capsys.readouterr()
         assert end.value.code == 0, f"{line}\n{captured.err}"
-    elif words[0] == "python" and words[1].startswith("benchmarks/"):
-        done = subprocess.run([sys.executable, words[1], "--help"], capture_output=True, text=True, check=True)
+    elif words[0] == "python" and words[1 + (words[1] == "-m")].startswith("benchmarks"):
+        program = words[1:3] if words[1] == "-m" else words[1:2]
+        done = subprocess.run([sys.executable, *program, "--help"], capture_output=True, text=True, check=True)
         assert set(options(words)) <= set(options(done.stdout.replace(",", " ").split())), line
     else:
         assert words[0] == "python", f"{line}: nobody runs this"
