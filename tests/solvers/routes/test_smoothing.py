@@ -10,15 +10,23 @@ import pytest
 from primal_cases import all_routes
 from route_brute import brute_force, random_problem
 
+from react_opt.certify_bound import recompute_bound
+from react_opt.instance import OrosInstance
 from react_opt.route_problem import RouteProblem
 from react_opt.solvers.routes import engine
+from react_opt.solvers.routes.budget import Budget, Standing
+from react_opt.solvers.routes.certificate import certificate
 from react_opt.solvers.routes.columns import Duals
+from react_opt.solvers.routes.dual_ascent import DualAscent
 from react_opt.solvers.routes.engine import solve_routes
+from react_opt.solvers.routes.generation import Generation
+from react_opt.solvers.routes.master import Master
 from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pricing import RoutePricer
 from react_opt.solvers.routes.routecolumn import route_column
 from react_opt.solvers.routes.slots import slot_prices
 from react_opt.solvers.routes.smoothing import SmoothedDual
+from react_opt.timegraph import route_problem
 
 
 def rich(seed: int) -> RouteProblem:
@@ -190,3 +198,45 @@ def test_threads_change_nothing() -> None:
     together = SmoothedDual(problem, everywhere(problem), threads=2).value(price, 0.5)
     assert together[0] == alone[0]
     assert np.array_equal(together[1], alone[1])
+
+
+def test_the_certificate_holds() -> None:
+    """The independent checker finds the bound of smoothed prices and grown memory again, on a grid with two starts."""
+    side, steps = 5, [(0, 1), (1, 0), (0, -1), (-1, 0)]
+    travel = [
+        {"from": f"c{x}{y}", "to": f"c{x + dx}{y + dy}", "steps": 1, "energy_j": 70.0}
+        for x in range(side)
+        for y in range(side)
+        for dx, dy in steps
+        if 0 <= x + dx < side and 0 <= y + dy < side and (x + y + dx) % 4 != 1
+    ]
+    robot = {"battery_j": 9000.0, "capacity_j": 9000.0, "idle_w": 2.0, "sensing_w": 16.9}
+    instance = OrosInstance.model_validate(
+        {
+            "kind": "oros",
+            "name": "grid",
+            "horizon_steps": 12,
+            "step_s": 10.0,
+            "cells": [{"id": f"c{x}{y}", "x_m": 10.0 * x, "y_m": 10.0 * y} for x in range(side) for y in range(side)],
+            "travel": travel,
+            "robots": [{"id": f"r{k}", "start": start, **robot} for k, start in enumerate(("c00", "c00", "c44"))],
+        }
+    )
+    problem = route_problem(instance)
+    standing = Standing(problem, Budget(None, 2_000, None), None, None)
+    memory = Memory(fewest_steps(problem), 3)
+    pricer = RoutePricer(problem, memory)
+    master = Master(problem.n_cells, [len(group.robots) for group in problem.classes], 1e6)
+    ascent = DualAscent(Generation(master, pricer, standing), memory, seed=0)
+    ascent.slots()
+    assert ascent.best is not None
+    first = ascent.best.bound
+    ascent.smooth()
+    assert ascent.best.bound < first - 1e-3 * first
+    proof = certificate(problem, memory, ascent.best, pricer.joule_prices)
+    again = recompute_bound(instance, proof)
+    assert again <= ascent.best.bound * (1.0 + 1e-9)
+    assert again >= ascent.best.bound - 0.02 * abs(ascent.best.bound)
+    plan = solve_routes(problem, work_limit=300)
+    assert plan.objective is not None
+    assert again >= plan.objective - 1e-9 * plan.objective
