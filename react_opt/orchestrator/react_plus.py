@@ -95,6 +95,16 @@ class ReactPlus:
         if goal is None:
             return False
         name = self.names[robot.id]
+        if robot.state in ("idle", "stuck"):
+            near = distance_m(robot, goal.view_m) <= SEEN_M
+            if near or robot.state == "stuck":
+                if near:
+                    self.looked.append(goal.view_m)
+                else:
+                    self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
+                why = "looked at; what is left is seen from elsewhere" if near else "no progress"
+                notes.append(Note("target_abandoned", robot=robot.id, target=name, reason=why))
+            return True
         if len(goal.blocks):
             rows, cols = goal.blocks[:, 0], goal.blocks[:, 1]
             shape = self.survey.hidden.shape
@@ -106,16 +116,6 @@ class ReactPlus:
             if seen_from(self.survey.blocks, view, hidden, COARSE, reach)[0] <= GONE * len(rows):
                 notes.append(Note("target_inspected", robot=robot.id, target=name))
                 return True
-        if robot.state in ("idle", "stuck"):
-            near = distance_m(robot, goal.view_m) <= SEEN_M
-            if near or robot.state == "stuck":
-                if near:
-                    self.looked.append(goal.view_m)
-                else:
-                    self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
-                why = "looked at; what is left is seen from elsewhere" if near else "no progress"
-                notes.append(Note("target_abandoned", robot=robot.id, target=name, reason=why))
-            return True
         return False
 
     # --- planning ---

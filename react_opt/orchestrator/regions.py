@@ -2,9 +2,9 @@
 
 Hidden space is shared out among the pieces of the frontier: each hidden block belongs to the piece it is nearest to
 through hidden space. How much of it a look from there reveals falls with its depth, since nobody knows what stands in
-the way: a share ``exp(-depth / MEAN_FREE_M)`` counts for the piece, the rest for the area in which the block lies,
-as something that has to be driven to. Where hidden space cannot be reached at all (the inside of a machine that has
-been seen from all sides) there is nothing to visit.
+the way: a share ``exp(-depth / MEAN_FREE_M)`` counts for the piece. Of what lies deeper than ``DEEP_M`` the rest
+counts for the area in which it lies, as something that has to be driven to. Where hidden space cannot be reached at
+all (the inside of a machine that has been seen from all sides) there is nothing to visit.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ IntArray = NDArray[np.int64]
 
 MEAN_FREE_M = 3.0
 """Mean length of a look into hidden space, m."""
+DEEP_M = 5.0
+"""What lies so deep is not looked into from the frontier: it is a matter of the area."""
 FREE_SHARE = 0.65
 """Share of hidden space that is expected to be free; the rest is walls and what stands on the floor."""
 MOST_PER_M = 4.0
@@ -134,6 +136,7 @@ class Regions:
         near, size, behind, owner, depth = share_out(
             survey.hidden, labels, len(clusters), area_of, len(areas), np.isfinite(time_s),
             MEAN_FREE_M / survey.coarse_m,
+            DEEP_M / survey.coarse_m,
         )  # fmt: skip
         fresh = np.isfinite(time_s)
         for point in looked_m:
@@ -221,6 +224,7 @@ def share_out(
     areas: int,
     reachable: NDArray[np.bool_],
     mean_free: float,
+    deep: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
     """Share hidden blocks out among frontier pieces and areas (see this module).
 
@@ -234,8 +238,8 @@ def share_out(
         Area of each coarse block, and how many there are.
     reachable
         Whether some robot gets there if hidden space is free.
-    mean_free
-        Coarse blocks.
+    mean_free, deep
+        Mean length of a look, and the depth from which the rest counts for the area, coarse blocks.
 
     Returns
     -------
@@ -275,7 +279,7 @@ def share_out(
                 share = np.exp(-depth[r, c] / mean_free)
                 near[owner[r, c]] += share * hidden[r, c]
                 size[owner[r, c]] += hidden[r, c]
-            if reachable[r, c]:
+            if reachable[r, c] and depth[r, c] > deep:
                 rest = (1.0 - share) * hidden[r, c]
                 behind[area_of[r, c], 0] += rest
                 behind[area_of[r, c], 1] += rest * r
