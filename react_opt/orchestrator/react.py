@@ -141,10 +141,10 @@ class React:
         kept: list[tuple[LocalTarget, float]] = []
         postponed = set()
         for target, value, is_low in zip(self.targets, values.tolist(), low.tolist(), strict=True):
-            if is_low or target.id in self.abandoned or target.stand_m is None:
+            if is_low or target.id in self.abandoned:
                 postponed.add(target.id)
                 if target.id not in self.postponed:
-                    why = f"priority {value:.2f}" if target.stand_m is not None else "not accessible"
+                    why = f"priority {value:.2f}" if is_low else "abandoned"
                     notes.append(
                         Note("target_postponed", target=target.id, reason=why, x_m=target.x_m, y_m=target.y_m,
                              size_m2=target.size_m2)

@@ -197,6 +197,7 @@ class Loop:
 
     def _moved(self, robot: RobotView, step_s: float) -> RobotView:
         if robot.state == "dead":
+            self.ways[robot.id] = []
             return robot
         way, left = self.ways[robot.id], robot.profile.speed_max_m_s * step_s
         x, y = robot.x_m, robot.y_m
