@@ -1,6 +1,6 @@
 """Tune the frontier methods on generated buildings, never on the maps that results are reported for.
 
-    python benchmarks/tune_baselines.py [--buildings 3] [--robots 2]
+    python -m benchmarks.tune_baselines [--buildings 3] [--robots 2]
 
 Per value of a method's parameter: the mean time to 97 % over the buildings, s (400 where it is not reached).
 """
@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import sys
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.buildings import building
 from react_opt.instance import Mission
 from react_opt.jsonio import load
 from react_opt.orchestrator.registry import make_strategy
 from react_opt.sim.loop import Simulation, options_of
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from buildings import building
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples" / "factory"
 HORIZON_S = 400.0
