@@ -15,6 +15,7 @@ import highspy
 import numpy as np
 
 from react_opt.route_problem import FloatArray, RouteProblem
+from react_opt.solvers.highs_model import fresh_scheduler
 
 
 def slot_prices(problem: RouteProblem, time_limit_s: float | None = None) -> FloatArray | None:
@@ -55,7 +56,9 @@ def slot_prices(problem: RouteProblem, time_limit_s: float | None = None) -> Flo
         count, -rows[kind, instant], np.zeros(count), np.full(count, highspy.kHighsInf), 2 * count,
         np.arange(0, 2 * count, 2, dtype=np.int32), index, np.ones(2 * count),
     )  # fmt: skip
+    fresh_scheduler()
     lp.run()
+    fresh_scheduler()  # the programmes that follow may ask for another number of threads
     if lp.getModelStatus() != highspy.HighsModelStatus.kOptimal:
         return None
     prices: FloatArray = np.maximum(0.0, -np.array(lp.getSolution().row_dual)[: len(rows)])[member]
