@@ -29,7 +29,10 @@ class Fault:
     message: str
 
     def __str__(self) -> str:
-        return ": ".join(part for part in (self.file, self.place, self.message) if part)
+        line = ": ".join(part for part in (self.file, self.place, self.message) if part)
+        # Names in a file may hold line breaks or halves of surrogate pairs: shown escaped, a fault stays one line
+        # that every terminal prints.
+        return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line)
 
 
 class InputError(ReactError):

@@ -235,6 +235,7 @@ def _decode(text: str, file: str) -> Any:
 def _place(location: tuple[int | str, ...]) -> str:
     place = ""
     for part in location:
+        part = part if isinstance(part, int) else _short(part)
         place += f"[{part}]" if isinstance(part, int) else f".{part}" if place else part
     return place
 
@@ -248,6 +249,10 @@ def _shown(value: Any) -> str:
         text = json.dumps(value)
     except (TypeError, ValueError):
         text = type(value).__name__
+    return _short(text)
+
+
+def _short(text: str) -> str:
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 

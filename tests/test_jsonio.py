@@ -273,6 +273,16 @@ def test_whatever_is_put_anywhere_is_read_or_told(kind: str, data: st.DataObject
     assert all("\n" not in line and len(line) < 400 for line in told)
 
 
+@pytest.mark.parametrize("name", ["a\nb", "\ud800", "x" * 1000])
+def test_a_strange_name_stays_one_printable_line(name: str) -> None:
+    content = document("oros") | {name: 1}
+    with pytest.raises(InputError) as told:
+        parse(content, file="f")
+    (line,) = str(told.value).splitlines()
+    assert line.isprintable()
+    assert len(line) < 150
+
+
 # --- size ---
 
 
