@@ -30,6 +30,22 @@ def ray_table(rays: int) -> FloatArray:
 
 
 @kernel
+def _enter_px(x: float, y: float, dx: float, dy: float) -> tuple[int, int, int, int, float, float, float, float]:
+    """Start a grid traversal: pixel, steps, and along the ray the distance per pixel and to the next border.
+
+    Amanatides and Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987.
+    """
+    c, r = floor(x), floor(y)
+    step_c = 1 if dx > 0 else -1
+    step_r = 1 if dy > 0 else -1
+    delta_c = abs(1.0 / dx) if dx != 0 else np.inf
+    delta_r = abs(1.0 / dy) if dy != 0 else np.inf
+    next_c = ((c + 1 - x) if dx > 0 else (x - c)) * delta_c if dx != 0 else np.inf
+    next_r = ((r + 1 - y) if dy > 0 else (y - r)) * delta_r if dy != 0 else np.inf
+    return c, r, step_c, step_r, delta_c, delta_r, next_c, next_r
+
+
+@kernel
 def scan_px(
     truth: Cells,
     known: Cells,
@@ -68,13 +84,7 @@ def scan_px(
     for n in range(table.shape[0]):
         dx = table[n, 0] * cos_yaw - table[n, 1] * sin_yaw
         dy = table[n, 0] * sin_yaw + table[n, 1] * cos_yaw
-        c, r = floor(x), floor(y)
-        step_c = 1 if dx > 0 else -1
-        step_r = 1 if dy > 0 else -1
-        delta_c = abs(1.0 / dx) if dx != 0 else np.inf
-        delta_r = abs(1.0 / dy) if dy != 0 else np.inf
-        next_c = ((c + 1 - x) if dx > 0 else (x - c)) * delta_c if dx != 0 else np.inf
-        next_r = ((r + 1 - y) if dy > 0 else (y - r)) * delta_r if dy != 0 else np.inf
+        c, r, step_c, step_r, delta_c, delta_r, next_c, next_r = _enter_px(x, y, dx, dy)
         while 0 <= r < rows and 0 <= c < cols:
             value = truth[r, c]
             if value != UNKNOWN and known[r, c] == UNKNOWN:
@@ -83,14 +93,12 @@ def scan_px(
                 count += 1
             if value != 0:
                 break
+            if next_c >= range_px and next_r >= range_px:
+                break
             if next_c <= next_r:
-                if next_c >= range_px:
-                    break
                 c += step_c
                 next_c += delta_c
             else:
-                if next_r >= range_px:
-                    break
                 r += step_r
                 next_r += delta_r
     return count
@@ -127,13 +135,7 @@ def unknown_ahead_px(
     for n in range(table.shape[0]):
         dx = table[n, 0] * cos_yaw - table[n, 1] * sin_yaw
         dy = table[n, 0] * sin_yaw + table[n, 1] * cos_yaw
-        c, r = floor(x), floor(y)
-        step_c = 1 if dx > 0 else -1
-        step_r = 1 if dy > 0 else -1
-        delta_c = abs(1.0 / dx) if dx != 0 else np.inf
-        delta_r = abs(1.0 / dy) if dy != 0 else np.inf
-        next_c = ((c + 1 - x) if dx > 0 else (x - c)) * delta_c if dx != 0 else np.inf
-        next_r = ((r + 1 - y) if dy > 0 else (y - r)) * delta_r if dy != 0 else np.inf
+        c, r, step_c, step_r, delta_c, delta_r, next_c, next_r = _enter_px(x, y, dx, dy)
         while 0 <= r < rows and 0 <= c < cols:
             value = known[r, c]
             if value == OCCUPIED:
@@ -143,14 +145,12 @@ def unknown_ahead_px(
                 count += 1
                 if count >= enough:
                     return count
+            if next_c >= range_px and next_r >= range_px:
+                break
             if next_c <= next_r:
-                if next_c >= range_px:
-                    break
                 c += step_c
                 next_c += delta_c
             else:
-                if next_r >= range_px:
-                    break
                 r += step_r
                 next_r += delta_r
     return count
@@ -162,26 +162,18 @@ def sees_any_px(truth: Cells, goal: NDArray[np.bool_], x: float, y: float, table
     rows, cols = truth.shape
     for n in range(table.shape[0]):
         dx, dy = table[n, 0], table[n, 1]
-        c, r = floor(x), floor(y)
-        step_c = 1 if dx > 0 else -1
-        step_r = 1 if dy > 0 else -1
-        delta_c = abs(1.0 / dx) if dx != 0 else np.inf
-        delta_r = abs(1.0 / dy) if dy != 0 else np.inf
-        next_c = ((c + 1 - x) if dx > 0 else (x - c)) * delta_c if dx != 0 else np.inf
-        next_r = ((r + 1 - y) if dy > 0 else (y - r)) * delta_r if dy != 0 else np.inf
+        c, r, step_c, step_r, delta_c, delta_r, next_c, next_r = _enter_px(x, y, dx, dy)
         while 0 <= r < rows and 0 <= c < cols:
             if truth[r, c] != 0:
                 break
             if goal[r, c]:
                 return True
+            if next_c >= range_px and next_r >= range_px:
+                break
             if next_c <= next_r:
-                if next_c >= range_px:
-                    break
                 c += step_c
                 next_c += delta_c
             else:
-                if next_r >= range_px:
-                    break
                 r += step_r
                 next_r += delta_r
     return False
@@ -226,13 +218,7 @@ def _trace_px(
     count = 0
     for n in range(cos.shape[0]):
         dx, dy = cos[n], sin[n]
-        c, r = floor(x), floor(y)
-        step_c = 1 if dx > 0 else -1
-        step_r = 1 if dy > 0 else -1
-        delta_c = abs(1.0 / dx) if dx != 0 else np.inf
-        delta_r = abs(1.0 / dy) if dy != 0 else np.inf
-        next_c = ((c + 1 - x) if dx > 0 else (x - c)) * delta_c if dx != 0 else np.inf
-        next_r = ((r + 1 - y) if dy > 0 else (y - r)) * delta_r if dy != 0 else np.inf
+        c, r, step_c, step_r, delta_c, delta_r, next_c, next_r = _enter_px(x, y, dx, dy)
         while True:
             out[count, 0], out[count, 1] = r, c
             if min(next_c, next_r) >= ends[n]:
