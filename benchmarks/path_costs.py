@@ -15,34 +15,19 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.families.factory import factory_map
 from benchmarks.path_trial import spread
 from react_opt.energy import RobotProfile
 from react_opt.geometry import load_map
 from react_opt.geometry.inflation import Footprint, FreeSpace, inflate
+from react_opt.jsonio import load
 from react_opt.paths.exact import exact_costs
 from react_opt.paths.ompl_costs import OmplPathCosts
 from react_opt.paths.protocol import PathCosts
 
-FACTORY = Path(__file__).parent.parent / "examples" / "factory" / "factory.yaml"
+FACTORY = factory_map()
 
-JACKAL = RobotProfile(
-    length_m=0.508,
-    width_m=0.43,
-    speed_max_m_s=0.89,
-    speed_min_m_s=0.3,
-    full_speed_clearance_m=0.6,
-    accel_m_s2=1.0,
-    turn_rad_s=1.5,
-    idle_w=2.0,
-    motion_w=7.0,
-    turn_w=9.0,
-    sensing_w=16.9,
-    battery_j=8245.96,
-    capacity_j=8245.96,
-    reserve_j=0.0,
-    lidar_range_m=8.0,
-    lidar_rays=360,
-)
+JACKAL = RobotProfile(**load(FACTORY.with_name("fleet_1.json")).profiles["jackal"].model_dump())
 
 # What is measured: a name and what prepares it. The first row is the reference of the ratios.
 ROWS: list[tuple[str, Callable[[FreeSpace], PathCosts]]] = [
@@ -58,15 +43,13 @@ ROWS: list[tuple[str, Callable[[FreeSpace], PathCosts]]] = [
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("map", nargs="?", type=Path, default=FACTORY if FACTORY.exists() else None)
+    parser.add_argument("map", nargs="?", type=Path, default=FACTORY)
     parser.add_argument("--points", nargs="+", type=int, default=[40, 200])
     parser.add_argument("--radius", type=float, default=JACKAL.radius_m)
     parser.add_argument("--rule", choices=("strict", "centres"), default="strict")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", nargs="+", choices=[name for name, _ in ROWS], help="rows to measure")
     options = parser.parse_args()
-    if options.map is None:
-        parser.error("a map is needed")
     rows = [row for row in ROWS if options.only is None or row[0] in options.only]
     source = load_map(options.map)
     inflate(source, Footprint(options.radius), rule=options.rule)

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from react_opt.geometry.occupancy import OccupancyMap
-from react_opt.instance import FleetRobot, Mission, Profile
+from react_opt.instance import FleetRobot, Mission
+from react_opt.jsonio import load
 
-JACKAL = Profile(
-    length_m=0.508,
-    width_m=0.43,
-    speed_max_m_s=0.89,
-    speed_min_m_s=0.3,
-    full_speed_clearance_m=0.6,
-    accel_m_s2=1.0,
-    turn_rad_s=1.5,
-    idle_w=2.0,
-    motion_w=7.0,
-    turn_w=9.0,
-    sensing_w=16.9,
-    battery_j=8245.96,
-    capacity_j=8245.96,
-    lidar_range_m=5.0,
-    lidar_rays=180,
-)
+FACTORY = Path(__file__).parents[2] / "examples" / "factory"
+JACKAL = load(FACTORY / "fleet_1.json").profiles["jackal"].model_copy(update={"lidar_range_m": 5.0, "lidar_rays": 180})
 
 
 def building(boxes: list[tuple[float, float, float, float]], size_m: tuple[float, float] = (12.0, 8.0)) -> OccupancyMap:
