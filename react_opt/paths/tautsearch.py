@@ -113,7 +113,9 @@ def _last_bend(corners: FloatArray, length: FloatArray, seen: IntArray, x: float
 @kernel
 def bends_between(padded: Padded, graph: Graph, ends: FloatArray) -> IntArray:
     """Return the corners along the shortest path between two free points; [-1] where there is none."""
-    x0, y0, x1, y1 = ends[0, 0], ends[0, 1], ends[1, 0], ends[1, 1]
+    forth = _comes_first(ends[0, 0], ends[0, 1], ends[1, 0], ends[1, 1])
+    one, two = (0, 1) if forth else (1, 0)
+    x0, y0, x1, y1 = ends[one, 0], ends[one, 1], ends[two, 0], ends[two, 1]
     if clear_between_px(padded, x0, y0, x1, y1):
         return np.empty(0, dtype=np.int64)
     corners = graph[0]
@@ -127,7 +129,14 @@ def bends_between(padded: Padded, graph: Graph, ends: FloatArray) -> IntArray:
         bends[found] = last
         last = before[last]
         found += 1
-    return bends[: max(found, 1)][::-1].copy()
+    bends = bends[: max(found, 1)]
+    return bends[::-1].copy() if forth else bends.copy()
+
+
+@kernel
+def _comes_first(x0: float, y0: float, x1: float, y1: float) -> bool:
+    """Tell from which of two points a search starts: among equally long paths a table and a path then hold the same."""
+    return x0 < x1 or (x0 == x1 and y0 <= y1)
 
 
 @kernel
@@ -156,10 +165,10 @@ def all_pairs(
             continue
         x, y = pixels[s, 0], pixels[s, 1]
         to_corner, corner_time, corner_turned, before = _reach(graph, seen[s], leg_s[s], x, y)
-        for t in range(s + 1, n):
-            if not free[t]:
-                continue
+        for t in range(n):
             tx, ty = pixels[t, 0], pixels[t, 1]
+            if not free[t] or t == s or not _comes_first(x, y, tx, ty):
+                continue
             if clear_between_px(padded, x, y, tx, ty):
                 length[s, t] = hypot(tx - x, ty - y)
                 time[s, t] = segment_px(field, x, y, tx, ty)

@@ -166,6 +166,18 @@ def test_promises_of_every_table_and_path(
             check_costs(pixel, space, points, metric=False)
 
 
+def test_of_two_equally_long_paths_table_and_path_hold_the_same() -> None:
+    # here two paths are equally long up to rounding, which differs by direction, and turn differently
+    rng = np.random.default_rng(427)
+    map_ = OccupancyMap((rng.random((25, 30)) < 0.06).astype(np.uint8), 0.5, 5e5, 4e6, -2.0)
+    points = map_.pixel_to_world(rng.random((8, 2)) * (30, 25))
+    space = inflate(map_, Footprint(0.4))
+    costs = VisibilityCosts(space, ROBOT)
+    check_costs(costs, space, points, metric=True)
+    again = costs.cost_table(points[::-1])
+    np.testing.assert_array_equal(again.time_s[::-1, ::-1], costs.cost_table(points).time_s)
+
+
 @settings(derandomize=True, deadline=None, max_examples=25)
 @given(seed=seeds, share=st.sampled_from((0.05, 0.2, 0.35)))
 def test_never_longer_than_over_pixels_and_at_best_a_little_shorter(seed: int, share: float) -> None:
