@@ -98,9 +98,8 @@ class PixelCosts:
         (way,) = self._ways(np.ascontiguousarray(self.space.to_pixels(ends)))
         if way.shape[0] == 0:
             return None
-        points = self.space.to_world(way)
-        points[0], points[-1] = ends
-        return drive(self.space, self.profile, points)
+        points = np.concatenate((ends[:1], self.space.to_world(way[1:-1]), ends[1:]))
+        return drive(self.space, self.profile, points, way)
 
     def costs_from(self, start_m: ArrayLike) -> FloatArray:
         """Return ``(rows, cols)`` costs from the centre of a point's pixel to every pixel's, s or m.

@@ -41,7 +41,7 @@ def terrain(space: FreeSpace, profile: RobotProfile) -> Field:
     return space.clearance_m, space.slow, np.array(law)
 
 
-def drive(space: FreeSpace, profile: RobotProfile, points_m: ArrayLike) -> Path:
+def drive(space: FreeSpace, profile: RobotProfile, points_m: ArrayLike, pixels: FloatArray | None = None) -> Path:
     """Return a path along way points with its measures, after testing it against the footprint.
 
     Parameters
@@ -52,6 +52,9 @@ def drive(space: FreeSpace, profile: RobotProfile, points_m: ArrayLike) -> Path:
         The robot.
     points_m
         ``(k, 2)`` way points, m.
+    pixels
+        The same in pixel coordinates, where they are known more exactly: far from a map's origin the way through
+        metres moves them by rounding, and a leg along a line of the grid is then cut differently.
 
     Raises
     ------
@@ -61,7 +64,8 @@ def drive(space: FreeSpace, profile: RobotProfile, points_m: ArrayLike) -> Path:
     points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
     if not space.path_free(points):
         raise ReactError("a path failed its check against the footprint")
-    length, time, clearance, turned = polyline_px(terrain(space, profile), space.to_pixels(points))
+    way = space.to_pixels(points) if pixels is None else pixels
+    length, time, clearance, turned = polyline_px(terrain(space, profile), way)
     total, energy = totals(profile, length, time, turned)
     return Path(points, float(length), float(total), float(energy), float(clearance))
 

@@ -56,8 +56,10 @@ class VisibilityCosts:
         ends = np.array((start_m, goal_m), dtype=np.float64)
         if not self.space.points_free(ends).all():
             return None
-        bends = bends_between(self.space.padded, self._graph, self.space.to_pixels(ends))
+        pixels = self.space.to_pixels(ends)
+        bends = bends_between(self.space.padded, self._graph, pixels)
         if bends.size == 1 and bends[0] < 0:
             return None
-        between = self.space.to_world(self._graph[0][bends, :2])
-        return drive(self.space, self.profile, np.concatenate((ends[:1], between, ends[1:])))
+        way = np.concatenate((pixels[:1], self._graph[0][bends, :2], pixels[1:]))
+        points = np.concatenate((ends[:1], self.space.to_world(way[1:-1]), ends[1:]))
+        return drive(self.space, self.profile, points, way)
