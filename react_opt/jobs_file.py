@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import json
 import os
+import time
 from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO
 
@@ -52,10 +53,8 @@ def opened(file: str | os.PathLike[str], kind: str | None = None) -> Iterator[tu
     except OSError as error:
         raise InputError.single(name, "", f"cannot be written: {error.strerror or error}") from None
     with handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise UsageError(f"{name}: another process is working on it") from None
+        if not _locked(handle):
+            raise UsageError(f"{name}: another process is working on it")
         handle.seek(0)
         content = handle.read()
         lines = _parsed(content, name)
@@ -63,6 +62,16 @@ def opened(file: str | os.PathLike[str], kind: str | None = None) -> Iterator[tu
             raise InputError.single(name, "", "holds something else than results: expected another file, or none")
         handle.truncate(content.rfind(b"\n") + 1)
         yield handle, lines
+
+
+def _locked(handle: BinaryIO) -> bool:
+    """Lock a file. The worker that a process was about to start when it was killed holds the lock a moment longer."""
+    for wait_s in (0.0, 0.05, 0.2, 0.5, 1.0):
+        time.sleep(wait_s)
+        with contextlib.suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+    return False
 
 
 def append(handle: BinaryIO, line: Mapping[str, Any]) -> None:
