@@ -12,6 +12,7 @@ import numpy as np
 from react_opt.errors import MissingPartError, UsageError
 from react_opt.models.program import Program
 from react_opt.solvers.backend import Abilities
+from react_opt.solvers.highs_model import feasibility_tolerance
 from react_opt.solvers.outcome import Claim, Request
 from react_opt.solvers.watch import Watch
 
@@ -39,8 +40,6 @@ def _highs(request: Request, left_s: float | None) -> dict[str, Any]:
     options = {
         "mip_rel_gap": request.gap_rel,
         "mip_abs_gap": request.gap_abs,
-        "mip_feasibility_tolerance": _TOLERANCE,
-        "primal_feasibility_tolerance": _TOLERANCE,
         "threads": request.threads,
         "random_seed": request.seed,
     }
@@ -194,6 +193,9 @@ def run(program: Program, request: Request, watch: Watch, variant: str = "") -> 
     notes = ["cvxpy has no way to start from a solution: the start was only kept"] if request.start is not None else []
     if solver not in _OPTIONS:
         notes.append(f"how to set limits and gaps of {solver} is not known here: it runs with its own, until killed")
+    if solver == "HIGHS":
+        tolerance = feasibility_tolerance(program)
+        options |= {"mip_feasibility_tolerance": tolerance, "primal_feasibility_tolerance": tolerance}
     claim = Claim("no_solution", settings=dict(options), notes=notes)
     try:
         problem.solve(solver=solver, **options)

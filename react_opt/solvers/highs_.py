@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from react_opt.models.program import Program
 from react_opt.solvers.backend import Abilities
-from react_opt.solvers.highs_model import TOLERANCE, to_highs, write_model
+from react_opt.solvers.highs_model import feasibility_tolerance, to_highs, write_model
 from react_opt.solvers.outcome import Claim, Limit, Outcome, Request
 from react_opt.solvers.watch import Watch
 from react_opt.solvers.watchdog import supervise
@@ -18,7 +18,6 @@ from react_opt.solvers.watchdog import supervise
 __all__ = ["HighsBackend", "to_highs", "write_model"]
 
 FloatArray = NDArray[np.float64]
-ROUNDING = 1e-10  # of sums of a hundred terms or so, relative to the largest
 _Status = highspy.HighsModelStatus
 _LIMITS: dict[Any, Limit] = {
     _Status.kTimeLimit: "time",
@@ -91,9 +90,7 @@ def _run(program: Program, request: Request, watch: Watch) -> Claim:
 
 def _settings(request: Request, program: Program) -> dict[str, Any]:
     mixed = bool(program.integer.any())
-    # HiGHS cuts nodes off at "best + one unit + tolerance": below the rounding of large objectives it cuts off optima.
-    largest = float(np.abs(program.cost).max(initial=0.0))
-    tolerance = min(1e-6, max(TOLERANCE, ROUNDING * largest))
+    tolerance = feasibility_tolerance(program)
     settings: dict[str, Any] = {
         "threads": request.threads,
         "random_seed": request.seed,

@@ -17,7 +17,18 @@ from react_opt.models.program import Program
 FloatArray = NDArray[np.float64]
 TOLERANCE = 1e-9
 """Feasibility tolerance that HiGHS is given; its default 1e-6 lets a joule's worth of objective slip."""
+ROUNDING = 1e-10
+"""Rounding of sums of a hundred terms or so, relative to the largest."""
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
+
+
+def feasibility_tolerance(program: Program) -> float:
+    """Return the feasibility tolerance with which HiGHS solves a mixed-integer program right.
+
+    HiGHS cuts nodes off at "best + one unit + tolerance": below the rounding of large objectives it cuts off optima.
+    """
+    largest = float(np.abs(program.cost).max(initial=0.0))
+    return min(1e-6, max(TOLERANCE, ROUNDING * largest))
 
 
 def to_highs(program: Program, *, names: bool = True) -> highspy.Highs:
