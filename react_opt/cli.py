@@ -286,11 +286,12 @@ def show(
     instance: Annotated[str | None, typer.Option("--instance", help="Instance of a plan, if not beside it.")] = None,
     map_file: Annotated[str | None, typer.Option("--map", help="Occupancy map to draw below.")] = None,
     hide_truth: Annotated[bool, typer.Option("--hide-truth", help="Leave out walls that nobody has seen.")] = False,
+    bound: Annotated[bool, typer.Option(help="A trace's proven bound on what can be known; takes seconds.")] = True,
 ) -> int:
     """Draw a file: an instance, fleet, mission, plan or trace. The page of a trace is its replay."""
     from react_opt.report.show import show as show_files
 
-    for line in show_files(files, output, instance=instance, map_file=map_file, truth=not hide_truth):
+    for line in show_files(files, output, instance=instance, map_file=map_file, truth=not hide_truth, bound=bound):
         print(line, file=sys.stderr)
     return OK
 

@@ -14,6 +14,7 @@ from matplotlib.patches import Circle, Patch
 
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.instance import Fleet, FleetCharger, Mission
+from react_opt.limits.curve import CoverageBound, share_at
 from react_opt.report.cellmap import draw_ground, metres
 from react_opt.report.colours import GREEN, GREY, INK, ORANGE, PALE
 from react_opt.report.style import WIDTH_IN, look, robot_key, shortened, tint
@@ -131,7 +132,7 @@ def _draw_powers(axes: Axes, fleet: Fleet | Mission) -> None:
 # --- trace ---
 
 
-def trace_figure(trace: Trace, *, truth: bool = True) -> Figure:
+def trace_figure(trace: Trace, *, truth: bool = True, bound: CoverageBound | None = None) -> Figure:
     """Return a mission as it went: final map and trajectories, sensors and batteries over time, coverage.
 
     Parameters
@@ -140,6 +141,8 @@ def trace_figure(trace: Trace, *, truth: bool = True) -> Figure:
         The mission's record.
     truth
         Whether walls that nobody has seen are drawn, lightly.
+    bound
+        What any team can have seen at most, by time (:func:`react_opt.limits.curve.coverage_bound`).
     """
     paths = tracks(trace)
     left_m, right_m, bottom_m, top_m = extent(trace)
@@ -168,7 +171,7 @@ def trace_figure(trace: Trace, *, truth: bool = True) -> Figure:
     strips, battery, curve = right.subplots(3, 1, sharex=True, height_ratios=(0.3 * count + 0.25, 1.6, 1.6))
     _draw_sensing(strips, trace, paths)
     draw_batteries(battery, paths)
-    draw_curve(curve, trace, paths)
+    draw_curve(curve, trace, paths, bound)
     curve.set_xlabel("time (s)")
     return figure
 
@@ -244,15 +247,21 @@ def draw_batteries(axes: Axes, paths: Tracks) -> None:
     axes.grid(axis="y")
 
 
-def draw_curve(axes: Axes, trace: Trace, paths: Tracks) -> None:
-    """Draw the known share of the coverable area over time, and when the high level was replanned."""
+def draw_curve(axes: Axes, trace: Trace, paths: Tracks, bound: CoverageBound | None = None) -> None:
+    """Draw the known share of the coverable area over time, its bound, and when the high level was replanned."""
     axes.plot(paths.t_s, 100 * paths.coverage, color=INK, linewidth=1.5)
     axes.fill_between(paths.t_s, 100 * paths.coverage, color=tint(GREY, 0.22), linewidth=0)
     decided = [event.t_s for event in trace.events if event.type == "replan"]
-    axes.plot(decided, [2.0] * len(decided), "|", color=INK, markersize=5, label="solver called")
+    if decided:
+        axes.plot(decided, [2.0] * len(decided), "|", color=INK, markersize=5, label="solver called")
     axes.set_ylim(0, 104)
     axes.set_yticks([0, 25, 50, 75, 100])
     axes.set_ylabel("known (%)")
     axes.grid(axis="y")
-    if decided:
+    if bound is not None:
+        axes.plot(
+            paths.t_s, 100 * share_at(bound, paths.t_s), color=INK, linewidth=0.9, linestyle=(0, (4, 2)),
+            drawstyle="steps-post", label="at most, any team (proven)",
+        )  # fmt: skip
+    if decided or bound is not None:
         axes.legend(loc="lower right")

@@ -27,6 +27,7 @@ def show(
     instance: str | Path | None = None,
     map_file: str | Path | None = None,
     truth: bool = True,
+    bound: bool = True,
 ) -> list[str]:
     """Write the picture or page of a file.
 
@@ -45,6 +46,8 @@ def show(
         An occupancy map to draw below cells and robots.
     truth
         Whether walls that the robots have not seen are shown.
+    bound
+        Whether a trace's coverage curve gets its proven bound, which takes seconds on a large map.
 
     Returns
     -------
@@ -84,16 +87,24 @@ def show(
     if isinstance(document, Trace) and suffix == ".html":
         from react_opt.report.replay import replay_page
 
-        write_bytes(replay_page(documents, truth=truth).encode(), output)
-        return []
+        notes: list[str] = []
+        bounds = [_bound(d, f, notes) if bound else None for d, f in zip(documents, files, strict=True)]
+        write_bytes(replay_page(documents, truth=truth, bounds=bounds).encode(), output)
+        return notes
     ground = None if map_file is None else load_map(map_file)
-    content, notes = _picture(document, Path(files[0]), suffix, instance, ground, truth)
+    content, notes = _picture(document, Path(files[0]), suffix, instance, ground, truth, bound)
     write_bytes(content, output)
     return notes
 
 
 def _picture(
-    document: Any, file: Path, suffix: str, instance: str | Path | None, ground: OccupancyMap | None, truth: bool
+    document: Any,
+    file: Path,
+    suffix: str,
+    instance: str | Path | None,
+    ground: OccupancyMap | None,
+    truth: bool,
+    bound: bool,
 ) -> tuple[bytes, list[str]]:
     _require_matplotlib()
     import matplotlib
@@ -103,19 +114,25 @@ def _picture(
 
     notes: list[str] = []
     with matplotlib.rc_context(RC):
-        figure = _figure(document, file, instance, ground, truth, notes)
+        figure = _figure(document, file, instance, ground, truth, bound, notes)
         if suffix != ".html":
             return render(figure, suffix[1:]), notes
         return figure_page(document, render(figure, "svg").decode()).encode(), notes
 
 
 def _figure(
-    document: Any, file: Path, instance: str | Path | None, ground: OccupancyMap | None, truth: bool, notes: list[str]
+    document: Any,
+    file: Path,
+    instance: str | Path | None,
+    ground: OccupancyMap | None,
+    truth: bool,
+    bound: bool,
+    notes: list[str],
 ) -> Any:
     if isinstance(document, Trace):
         from react_opt.report.mission_figure import trace_figure
 
-        return trace_figure(document, truth=truth)
+        return trace_figure(document, truth=truth, bound=_bound(document, file, notes) if bound else None)
     if isinstance(document, Fleet | Mission):
         from react_opt.report.mission_figure import fleet_figure
 
@@ -139,6 +156,20 @@ def _figure(
         return assignment_figure(document, given)
     assert isinstance(document, InspectionPlan)
     return inspection_figure(document, given)
+
+
+def _bound(trace: Trace, file: str | Path, notes: list[str]) -> Any:
+    """Return the bound of a trace's coverage curve; None, and a note, where there is none."""
+    from react_opt.limits.curve import coverage_bound
+
+    try:
+        bound = coverage_bound(trace)
+    except UsageError as error:
+        notes.append(f"{file}: no bound on the coverage: {error}")
+        return None
+    if bound is None:
+        notes.append(f"{file}: no bound on the coverage: a prior map may show anything at once")
+    return bound
 
 
 def _middle_instance(document: AssignmentInstance | InspectionInstance) -> Any:

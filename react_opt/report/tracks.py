@@ -94,6 +94,7 @@ def target_states(trace: Trace, until_s: float = float("inf")) -> dict[str, tupl
     """Return place (m, in the map's own frame) and state of every local target by a time, where it has a place."""
     place: dict[str, tuple[float, float]] = {}
     state: dict[str, str] = {}
+    bound_for: dict[str | None, str] = {}
     for event in trace.events:
         if event.t_s > until_s or event.target is None or event.type not in STATE_OF:
             continue
@@ -101,4 +102,9 @@ def target_states(trace: Trace, until_s: float = float("inf")) -> dict[str, tupl
             at = on_grid(trace, event.x_m, event.y_m)
             place[event.target] = float(at[0]), float(at[1])
         state[event.target] = STATE_OF[event.type]
+        if event.type == "target_taken":  # what its robot was on its way to waits again
+            before = bound_for.get(event.robot, event.target)
+            if before != event.target and state.get(before) == "taken":
+                state[before] = "new"
+            bound_for[event.robot] = event.target
     return {name: (*place[name], state[name]) for name in state if name in place}

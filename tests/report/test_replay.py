@@ -16,6 +16,7 @@ from small_trace import FACTORY, scripted
 
 from react_opt import load, parse, save
 from react_opt.instance import Failure, Link
+from react_opt.limits.curve import coverage_bound, share_at
 from react_opt.report.replay import replay_page
 from react_opt.report.show import show
 from react_opt.sim.run import simulate
@@ -208,11 +209,14 @@ def test_a_simulated_mission_with_an_outage_and_a_lost_robot(opened):
     changes = {"horizon_s": 15.0, "link": link, "failures": (Failure(robot="r2", t_s=10.0),)}
     trace = simulate(load(FACTORY.parent / "mission_2.json").model_copy(update=changes), FACTORY.parent)
     browser = opened(trace)
+    bound = coverage_bound(trace)
     for t_s, link_text, sensing in ((2.0, "up", "on"), (6.0, "down", "on"), (12.0, "up", "lost")):
         scrub(browser, t_s)
         frame = next(frame for frame in trace.frames if frame.t_s == t_s)
         assert text(browser, "known-0") == f"{100 * frame.coverage:.1f} %"
         assert int(text(browser, "battery-0-1").removesuffix(" J")) == pytest.approx(frame.robots[1].battery_j, abs=0.6)
+        most = text(browser, "most-0").removeprefix("any team: at most ").removesuffix(" %")
+        assert float(most) == pytest.approx(100 * share_at(bound, np.array([t_s]))[0], abs=0.06)
         assert text(browser, "link-0-1") == link_text
         assert text(browser, "sensing-0-1") == sensing
     replans = sorted({event.t_s for event in trace.events if event.type == "replan"})
@@ -249,7 +253,7 @@ def test_walls_that_nobody_saw_can_be_kept_out_of_the_page():
     from react_opt.report.replay import _payload
 
     trace = scripted()
-    pixels = trace.truth.model_copy(update={"data": _payload(trace, truth=False)["truth"]}).array("u1")
+    pixels = trace.truth.model_copy(update={"data": _payload(trace, truth=False, bound=None)["truth"]}).array("u1")
     never = trace.known.array("<u2") == NEVER
     assert (pixels[never] == 3).all()
     assert (pixels[~never] == trace.truth.array("u1")[~never]).all()

@@ -15,6 +15,7 @@ from react_opt.report.layout import layout, walls
 from react_opt.report.show import show
 from react_opt.report.timeline import coverage, coverage_limit, spans
 from react_opt.report.tracks import target_states, tracks
+from react_opt.trace import TraceEvent
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".html": b"<!DOCTYPE html>"}
 KINDS = ["oros", "assignment", "inspection", "fleet", "oros_plan", "assignment_plan", "inspection_plan"]
@@ -166,6 +167,13 @@ def test_tracks_and_target_states_are_those_of_the_trace():
         "t2": "postponed",
     }
     assert target_states(trace, until_s=5.0)["t1"] == (18.0, 15.0, "taken")
+
+
+def test_a_target_left_for_another_waits_again():
+    trace = scripted()
+    taken = [TraceEvent(t_s=1.0, type="target_taken", robot="r1", target=name, x_m=1.0, y_m=1.0) for name in ("a", "b")]
+    states = target_states(trace.model_copy(update={"events": (*taken,)}))
+    assert {name: state for name, (_, _, state) in states.items()} == {"a": "new", "b": "taken"}
 
 
 def test_a_turned_map_is_shown_in_its_own_frame():

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.limits.curve import CoverageBound, share_at
 from react_opt.report.colours import ROBOT_COLOURS
 from react_opt.report.tracks import on_grid, tracks
 from react_opt.trace import NEVER, Trace, TraceEvent, pixel_data
@@ -29,7 +30,9 @@ _SCRIPTS = ("data.js", "draw.js", "app.js")
 _GONE = -(2**31)  # a robot that a frame does not name
 
 
-def replay_page(traces: Sequence[Trace], *, truth: bool = True) -> str:
+def replay_page(
+    traces: Sequence[Trace], *, truth: bool = True, bounds: Sequence[CoverageBound | None] | None = None
+) -> str:
     """Return the replay of one trace, or of two side by side, as an HTML page.
 
     Parameters
@@ -38,11 +41,16 @@ def replay_page(traces: Sequence[Trace], *, truth: bool = True) -> str:
         One trace or two.
     truth
         Whether the page holds the walls that the robots have not seen (shown or hidden by the viewer).
+    bounds
+        Per trace what any team can have seen at most (:func:`react_opt.limits.curve.coverage_bound`), None for none.
     """
+    given = [None] * len(traces) if bounds is None else bounds
     folder = files("react_opt.report.replay")
     script = "".join((folder / name).read_text(encoding="utf-8") for name in _SCRIPTS)
     style = (folder / "page.css").read_text(encoding="utf-8")
-    payload = json.dumps([_payload(trace, truth) for trace in traces], separators=(",", ":"))
+    payload = json.dumps(
+        [_payload(trace, truth, bound) for trace, bound in zip(traces, given, strict=True)], separators=(",", ":")
+    )
     parts = {
         "@POLICY@": f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; base-uri 'none'",
         "@STYLE@": style,
@@ -59,9 +67,9 @@ def _hash(text: str) -> str:
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
-def _payload(trace: Trace, truth: bool) -> dict[str, str]:
+def _payload(trace: Trace, truth: bool, bound: CoverageBound | None) -> dict[str, str]:
     """Return a trace as three base64 texts: what happened, when pixels became known, and what they are."""
-    told = json.dumps(_told(trace), separators=(",", ":"), allow_nan=False)
+    told = json.dumps(_told(trace, bound), separators=(",", ":"), allow_nan=False)
     values = trace.truth.array("u1").astype(np.uint8)
     if not truth:
         values = np.where(trace.known.array("<u2") == NEVER, 3, values).astype(np.uint8)
@@ -86,7 +94,7 @@ def _by_frame(trace: Trace) -> NDArray[np.uint16]:
     return np.where(known == NEVER, NEVER, np.minimum(frame, NEVER - 1)).astype(np.uint16)
 
 
-def _told(trace: Trace) -> dict[str, Any]:
+def _told(trace: Trace, bound: CoverageBound | None) -> dict[str, Any]:
     mission, grid, paths = trace.mission, trace.known, tracks(trace)
     names: dict[str, int] = {}
     goals = np.full(paths.sensing.shape, -1)
@@ -119,6 +127,7 @@ def _told(trace: Trace) -> dict[str, Any]:
         "scales": SCALES,
         "t": _deltas(paths.t_s / SCALES["t"]),
         "coverage": _deltas(paths.coverage / SCALES["coverage"]),
+        "most": [] if bound is None else _deltas(np.ceil(share_at(bound, paths.t_s) / SCALES["coverage"] - 1e-9)),
         "x": [_deltas(each / SCALES["x"]) for each in paths.x_m.T],
         "y": [_deltas(each / SCALES["y"]) for each in paths.y_m.T],
         "yaw": [_deltas(each / SCALES["yaw"]) for each in paths.yaw_rad.T],

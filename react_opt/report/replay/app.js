@@ -55,9 +55,10 @@ class Replay {
     this.cells = this.traces.map((trace, k) => {
       const team = make("div", undefined, "team");
       if (this.traces.length > 1) team.append(make("h3", `${"AB"[k]}: ${trace.strategy}, ${trace.name}`));
-      const known = make("div", undefined, "known"), share = make("span");
+      const known = make("div", undefined, "known"), share = make("span"), most = make("small");
       share.id = `known-${k}`;
-      known.append(share, make("small", " of the building known"));
+      most.id = `most-${k}`;
+      known.append(share, make("small", " of the building known"), most);
       const counts = make("div", "", "counts");
       counts.id = `targets-${k}`;
       const table = make("table"), head = table.createTHead().insertRow();
@@ -80,7 +81,7 @@ class Replay {
       });
       team.append(known, counts, table);
       $("teams").append(team);
-      return { share, counts, rows };
+      return { share, most, counts, rows };
     });
   }
 
@@ -181,6 +182,7 @@ class Replay {
   showTeam(trace, k, state) {
     const i = Math.max(0, indexAt(trace.t, this.t)), cells = this.cells[k];
     cells.share.textContent = trace.t.length ? `${(100 * trace.coverage[i]).toFixed(1)} %` : "unknown";
+    cells.most.textContent = trace.most.length ? `any team: at most ${(100 * trace.most[i]).toFixed(1)} %` : "";
     const count = new Map();
     for (const kind of state.targets.values()) count.set(kind, (count.get(kind) ?? 0) + 1);
     const kinds = Object.keys(TARGET_LOOK).filter((kind) => count.has(kind));

@@ -44,6 +44,7 @@ async function decode(parts) {
   const scales = told.scales;
   trace.t = summed(told.t, scales.t);
   trace.coverage = summed(told.coverage, scales.coverage);
+  trace.most = summed(told.most, scales.coverage); // what any team can have seen at most; empty where not known
   for (const key of ["x", "y", "yaw", "battery"]) trace[key] = told[key].map((row) => summed(row, scales[key]));
   for (const key of ["sensing", "goal"]) trace[key] = told[key].map((row) => summed(row, 1));
   trace.end = trace.t.length ? trace.t[trace.t.length - 1] : 0;
@@ -77,11 +78,17 @@ function poseAt(trace, k, t) {
 // What is true at time t by the events so far.
 function stateAt(trace, t) {
   const state = { targets: new Map(), places: new Map(), down: new Set(), trouble: new Map(), decision: null, count: 0 };
+  const boundFor = new Map();
   for (const event of trace.events) {
     if (event.t_s > t + 1e-9) break;
     state.count++;
     if (event.target !== undefined && event.x_m !== undefined) state.places.set(event.target, [event.x_m, event.y_m]);
     if (event.type in STATE_OF && event.target !== undefined) state.targets.set(event.target, STATE_OF[event.type]);
+    if (event.type === "target_taken") { // what its robot was on its way to waits again
+      const before = boundFor.get(event.robot);
+      if (before !== undefined && before !== event.target && state.targets.get(before) === "taken") state.targets.set(before, "new");
+      boundFor.set(event.robot, event.target);
+    }
     if (event.type === "link_down") state.down.add(event.robot ?? "*");
     if (event.type === "link_up") event.robot === undefined ? state.down.clear() : state.down.delete(event.robot);
     if (event.type === "robot_dead" || event.type === "battery_empty") state.trouble.set(event.robot, "lost");

@@ -194,10 +194,13 @@ class Stage {
     this.curves.boxes = [one, two];
     this.frame(pen, one, "known (%) over time (s)", 100, t);
     this.traces.forEach((trace, k) => {
+      pen.setLineDash([2, 2]);
+      this.line(pen, one, trace.t, trace.most.map((share) => 100 * share), 100, k ? "#d55e00" : GREY, 1.2);
       pen.setLineDash(k ? [5, 3] : []);
       this.line(pen, one, trace.t, trace.coverage.map((share) => 100 * share), 100, k ? "#d55e00" : INK, 2);
     });
     pen.setLineDash([]);
+    if (this.traces.some((trace) => trace.most.length)) label(pen, "dotted: at most, any team (proven)", Math.max(one.x + 4, one.x + one.w - 216), one.y + one.h - 8, GREY);
     const top = Math.max(1e-9, ...this.traces.flatMap((trace) => trace.battery.map((row) => row.reduce((a, b) => Math.max(a, b || 0), 0)))) / 1000;
     this.frame(pen, two, "battery (kJ) over time (s)", top, t);
     this.traces.forEach((trace, k) => trace.robots.forEach((robot, r) => {
@@ -241,6 +244,7 @@ class Stage {
   }
 
   line(pen, box, times, values, top, colour, width) {
+    if (!values.length) return;
     pen.strokeStyle = colour;
     pen.lineWidth = width;
     pen.beginPath();
