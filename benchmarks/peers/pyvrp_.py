@@ -10,8 +10,7 @@ from benchmarks.peers.plans import inspection_plan, whole, without_plan
 from benchmarks.peers.registry import Limits, Tell, needs, peer
 from react_opt.models.inspection import ABSENT, InspectionArrays, Routes, build
 
-SCALE = 1000  # whole milliseconds and millijoules
-PRIZE = 10_000_000  # per unit of value: more than any sum of durations
+SCALE = 100  # whole hundredths of s and J: of 10, 100, 1000 and 10000 the one with which PyVRP found most
 
 
 @peer(
@@ -20,29 +19,46 @@ PRIZE = 10_000_000  # per unit of value: more than any sum of durations
 )  # fmt: skip
 def pyvrp(instance: Any, limits: Limits, tell: Tell) -> Any:
     """Search until the time is up; PyVRP proves no bound."""
-    import pyvrp
-    from pyvrp.stop import MaxRuntime
-
     begun = time.perf_counter()
     model = build(instance)
     arrays = model.arrays
-    problem = _model(pyvrp, arrays)
-    found = _Watched(MaxRuntime(max(0.01, limits.time_s - (time.perf_counter() - begun))), arrays, begun, tell)
-    best = problem.solve(found, seed=limits.seed, display=False, collect_stats=False).best
-    routes: Routes = [[] for _ in arrays.time_s]
-    for route in best.routes():
-        routes[route.vehicle_type()] = [stop.idx for stop in route if stop.is_client()]
-    if not best.is_feasible():
+    routes = search(arrays, limits.time_s, limits.seed, tell)
+    if routes is None:
         return without_plan(instance, "pyvrp", limit="time", reason="no feasible routes were found")
     tell(time.perf_counter() - begun, arrays.worth(routes)[0], None)
     return inspection_plan(instance, model, routes, None, "time", "pyvrp")
 
 
+def search(arrays: InspectionArrays, seconds: float, seed: int, tell: Tell | None = None) -> Routes | None:
+    """Search for routes for so many seconds, modelling included; None where no feasible ones were found."""
+    import pyvrp
+    from pyvrp.stop import MaxRuntime
+
+    begun = time.perf_counter()
+    prize = _prize(arrays)
+    problem = _model(pyvrp, arrays, prize)
+    stop: Any = MaxRuntime(max(0.01, seconds - (time.perf_counter() - begun)))
+    if tell is not None:
+        stop = _Watched(stop, arrays, begun, tell, prize)
+    best = problem.solve(stop, seed=seed, display=False, collect_stats=False).best
+    if not best.is_feasible():
+        return None
+    routes: Routes = [[] for _ in arrays.time_s]
+    for route in best.routes():
+        routes[route.vehicle_type()] = [stop.idx for stop in route if stop.is_client()]
+    return routes
+
+
+def _prize(arrays: InspectionArrays) -> int:
+    """Return the prize of a unit of value: just more than any sum of durations."""
+    return int(len(arrays.time_s) * arrays.time_limit_s * SCALE) + 1
+
+
 class _Watched:
     """A stopping criterion that also tells how the best cost falls: the value is what its prizes say."""
 
-    def __init__(self, inner: Any, arrays: InspectionArrays, begun: float, tell: Tell) -> None:
-        self._inner, self._begun, self._tell = inner, begun, tell
+    def __init__(self, inner: Any, arrays: InspectionArrays, begun: float, tell: Tell, prize: int) -> None:
+        self._inner, self._begun, self._tell, self._prize = inner, begun, tell, prize
         self._all = float(arrays.value.sum())
         self._best = float("inf")
 
@@ -50,17 +66,17 @@ class _Watched:
         if best_cost < self._best and best_cost < 2**60:
             self._best = best_cost
             # cost = prizes left out + durations, and the durations are less than one unit of prize
-            value = self._all - int(best_cost // PRIZE)
+            value = self._all - int(best_cost // self._prize)
             self._tell(time.perf_counter() - self._begun, value, None)
         return bool(self._inner(best_cost))
 
 
-def _model(pyvrp: Any, arrays: InspectionArrays) -> Any:
+def _model(pyvrp: Any, arrays: InspectionArrays, prize: int) -> Any:
     n = len(arrays.value)
     model = pyvrp.Model()
     places = [model.add_location(0, 0) for _ in range(n + 2 * len(arrays.time_s))]
     for i, value in enumerate(arrays.value.tolist()):
-        model.add_client(places[i], prize=round(value * PRIZE), required=False)
+        model.add_client(places[i], prize=round(value * prize), required=False)
     for r, limit_j in enumerate(arrays.energy_limit_j.tolist()):
         profile = model.add_profile()
         start, end = places[n + 2 * r], places[n + 2 * r + 1]
