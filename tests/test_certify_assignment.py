@@ -105,6 +105,8 @@ def test_a_false_reason_is_named(reason: str) -> None:
         {"status": "infeasible", "reason": "fleet: none"},
         {"bound": 1000.0, "gap": None},
         {"objective": None, "gap": None},
+        {"bound": None, "gap": None},
+        {"status": "infeasible", "reason": None, "objective": None, "bound": None, "gap": None},
     ],
 )
 def test_a_false_claim_is_named(claim: dict[str, Any]) -> None:
@@ -114,6 +116,23 @@ def test_a_false_claim_is_named(claim: dict[str, Any]) -> None:
 def test_a_plan_of_another_instance_is_named() -> None:
     other = jsonio.parse({**DATA, "name": "another"})
     assert {v.rule for v in check(other, PLAN).violations} == {"instance"}
+
+
+def test_a_plan_of_another_kind_or_under_another_name_is_named() -> None:
+    empty = {"name": "none", "time_left_s": 1.0, "robots": [], "targets": [], "travel": []}
+    other = jsonio.parse({"kind": "inspection", **empty})
+    assert {v.rule for v in check(other, PLAN).violations} == {"instance"}
+    assert rules(changed(instance={**PLAN.instance.model_dump(), "name": "another"})) == {"instance"}
+
+
+def test_a_conflict_of_a_target_that_has_none_is_named() -> None:
+    plan = pairs(("a", "k0"))
+    for row in plan["deferred"]:
+        if row["target"] == "k3":  # no conflict pair holds k3
+            row.update(reason="conflict")
+    assert "reason" in rules(changed(**plan))
+    found = [v.message for v in check(INSTANCE, changed(**plan)).violations if v.place == "k3"]
+    assert found == ["found conflict, but no conflict pair names it"]
 
 
 def test_a_negative_loss_of_an_optimal_plan_is_named() -> None:

@@ -101,11 +101,16 @@ def _detour(data: dict[str, Any]) -> None:
         (lambda d: d["claim"].update(bound=6.0), "claim"),
         (lambda d: d["claim"].update(bound=8.0, gap=1 / 7), "claim"),
         (lambda d: d["claim"].update(status="no_plan"), "claim"),
+        (lambda d: d["claim"].update(bound=None, gap=None), "claim"),
+        (lambda d: d["claim"].update(gap=0.5), "claim"),
+        (lambda d: d["claim"].update(status="infeasible", reason=None), "claim"),
         (lambda d: d["claim"]["secondary"].update(objective=1.0), "secondary"),
+        (lambda d: d["claim"]["secondary"].update(objective=None), "secondary"),
         (lambda d: d["claim"]["secondary"].update(bound=1e6), "secondary"),
         (lambda d: d["claim"]["secondary"].update(bound=0.0), "secondary"),
         (lambda d: d["claim"].update(status="feasible"), "secondary"),
         (lambda d: d["instance"].update(sha256="0"), "instance"),
+        (lambda d: d["instance"].update(name="another"), "instance"),
     ],
 )
 def test_each_broken_rule_is_named(change: Callable[[dict[str, Any]], Any], rule: str) -> None:
@@ -122,6 +127,18 @@ def test_budgets_are_kept(field: str, value: float, rule: str) -> None:
     mine = copy.deepcopy(GOOD)
     mine["instance"]["sha256"] = jsonio.sha256(tighter)
     assert rule in {violation.rule for violation in check(tighter, jsonio.parse(mine)).violations}
+
+
+def test_an_end_that_no_row_leads_to_is_named() -> None:
+    route = next(route for route in GOOD["routes"] if route["robot"] == "a")
+    last = route["stops"][-1]["target"]
+    data = copy.deepcopy(DATA)
+    data["travel"] = [row for row in data["travel"] if (row["from"], row["to"]) != (last, "exit")]
+    broken = jsonio.parse(data)
+    mine = copy.deepcopy(GOOD)
+    mine["instance"]["sha256"] = jsonio.sha256(broken)
+    found = [v for v in check(broken, jsonio.parse(mine)).violations if v.rule == "drive"]
+    assert [(v.place, v.message) for v in found] == [("a", f"no row leads from {last!r} to the end 'exit'")]
 
 
 def test_an_end_out_of_reach_is_infeasible_and_names_the_robot() -> None:

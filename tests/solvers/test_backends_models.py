@@ -15,6 +15,7 @@ from react_opt.errors import ReactError, UsageError
 from react_opt.models.program import Program
 from react_opt.solvers.cvxpy_ import to_cvxpy
 from react_opt.solvers.highs_ import to_highs, write_model
+from react_opt.solvers.highs_model import feasibility_tolerance
 from react_opt.solvers.outcome import Request
 from react_opt.solvers.registry import backend
 
@@ -156,3 +157,13 @@ def test_the_cp_sat_model_is_the_program_in_whole_numbers() -> None:
         "print(program.objective(x), solver.objective_value / float(handed.scaling.objective_scale))\n"
     ).split()
     assert [float(value) for value in printed] == pytest.approx([1.59, 1.59], abs=1e-12)
+
+
+@pytest.mark.parametrize("largest", [1.0, 984.0, 5e4, 1e9])
+def test_highs_tolerates_the_rounding_of_a_sum_of_a_hundred_of_the_largest_costs(largest: float) -> None:
+    # With 1e-9 whatever the costs, HiGHS cut off the optimum 98584 of a generalised assignment of 100 targets.
+    program = Program("large", maximise=True)
+    program.add_columns("x", np.arange(100), cost=largest, upper=1.0, integer=True)
+    tolerance = feasibility_tolerance(program)
+    assert 1e-9 <= tolerance <= 1e-6
+    assert tolerance >= min(1e-6, 4 * float(np.spacing(100 * largest)))
