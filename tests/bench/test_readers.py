@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from benchmarks.readers import FORMATS, documents
+from benchmarks.readers.__main__ import main as convert
 from benchmarks.readers.tsplib import DISTANCES
-from react_opt import check, solve
+from react_opt import check, load, solve
 from react_opt.errors import InputError, UsageError
 
 POINTS = [(0, 0), (10, 0), (10, 7), (3, 8), (-5, 2), (-2, -9)]
@@ -126,6 +127,28 @@ def test_generalised_assignment_files(tmp_path: Path, format: str, pick: Any) ->
     assert len(plan.assigned) == 5
     given = {(int(a.robot[1:]), int(a.target[1:])) for a in plan.assigned}
     assert sum(cost[r][k] for r, k in given) == pick(totals)
+
+
+def test_files_are_written_as_instances_that_solve_to_the_same(tmp_path: Path, capsys: Any) -> None:
+    """Two agents, three jobs; agent 0 has room for one of them. The best profits are 9 + 7 + 8 = 24."""
+    text = "1\n2 3\n9 6 7\n5 7 8\n4 4 4\n3 3 3\n5 6\n"
+    good = written(tmp_path, "small.txt", text)
+    folder = tmp_path / "made"
+    assert convert(["gap-max", good, "-o", str(folder)]) == 0
+    (path,) = capsys.readouterr().out.split()
+    plan = solved(load(path))
+    gain = load(path).targets[0].gain
+    assert len(plan.assigned) == 3
+    # A pair costs what it falls short of the largest profit, 9.
+    assert 3 * 9 - (3 * gain - plan.claim.objective) == 24
+
+
+def test_a_file_of_another_format_is_not_written(tmp_path: Path, capsys: Any) -> None:
+    bad = written(tmp_path, "bad.txt", "1\n2 3\n9 6\n")
+    folder = tmp_path / "made"
+    assert convert(["gap-max", bad, "-o", str(folder)]) == 2
+    assert str(bad) in capsys.readouterr().err
+    assert not folder.exists()
 
 
 def test_a_movingai_scenario_drives_along_shortest_paths(tmp_path: Path) -> None:
