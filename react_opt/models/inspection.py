@@ -187,7 +187,8 @@ def program(arrays: InspectionArrays, least_value: float | None = None) -> Progr
     worth = np.append(arrays.value, [0.0, 0.0])[j]
     cost = worth if least_value is None else arrays.cost[robot, i, j]
     x = model.add_columns("x", np.column_stack([robot, i, j]), cost=cost, upper=1.0, integer=True)
-    u = model.add_columns("u", np.arange(n), upper=float(max(1, n)))
+    # Whole positions cut nothing off, and solvers that compute in whole numbers can be given them.
+    u = model.add_columns("u", np.arange(n), upper=float(max(1, n)), integer=True)
     each = np.arange(n_robots)
     out, arrive = i == n, j == n + 1
     model.add_rows("leave", each, row=robot[out], column=x[out], value=1.0, lower=1.0, upper=1.0)
