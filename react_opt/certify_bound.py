@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.certify_bound_choice import best_of, worthwhile_routes
 from react_opt.certify_bound_route import Prices, best_route
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance, OrosRobot
@@ -107,8 +108,20 @@ def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float
 def _bound_of(instance: OrosInstance, leaf: Mapping[str, Any], memory: list[list[int]], part: _Part) -> float:
     """Return the bound on the plans of a part that the prices of a leaf prove."""
     prices = _read(instance, leaf, memory, part)
+    if leaf.get("enumerated", False):
+        return _bound_of_choice(instance, leaf, prices, part)
     total = float(prices.cell.sum()) + sum(prices.cut_price) + prices.rows_worth
-    seen: list[int] = []
+    for group, robot, first, last in _classes(instance, leaf, part):
+        rate = float(group.get("joule_price", 0))
+        total += len(group["robots"]) * best_route(instance, robot, prices, float(group["best"]), rate, first, last)
+    return total
+
+
+def _classes(
+    instance: OrosInstance, leaf: Mapping[str, Any], part: _Part
+) -> list[tuple[Mapping[str, Any], OrosRobot, NDArray[np.int64], NDArray[np.int64]]]:
+    """Return each class of a leaf with one of its robots, and when that may collect each cell."""
+    classes, seen = [], []
     for group in leaf["classes"]:
         index = [int(r) for r in group["robots"]]
         robots = [instance.robots[r] for r in index]
@@ -118,11 +131,36 @@ def _bound_of(instance: OrosInstance, leaf: Mapping[str, Any], memory: list[list
         if np.any(first != first[0]) or np.any(last != last[0]):
             raise UsageError("the certificate puts robots into one class about which its questions differ")
         seen += index
-        rate = float(group.get("joule_price", 0))
-        total += len(robots) * best_route(instance, robots[0], prices, float(group["best"]), rate, first[0], last[0])
+        classes.append((group, robots[0], first[0], last[0]))
     if sorted(seen) != list(range(len(instance.robots))):
         raise UsageError("the certificate does not name every robot once")
-    return total
+    return classes
+
+
+def _bound_of_choice(instance: OrosInstance, leaf: Mapping[str, Any], prices: Prices, part: _Part) -> float:
+    """Return the bound of a leaf that rests on enumeration: its own, or a choice of routes that exceeds it.
+
+    Where a route is worth more after prices than its class's best is said to be, that value counts.
+    """
+    limits = instance.limits
+    if limits.forbid_swaps or limits.robots_per_cell is not None or limits.sensing_robots_per_step is not None:
+        raise UsageError("the certificate enumerates routes, which limits between robots do not allow")
+    classes, floor = _classes(instance, leaf, part), float(leaf["bound"])
+    best = [float(group["best"]) for group, *_ in classes]
+    counts = [len(group["robots"]) for group, *_ in classes]
+    while True:
+        total = float(prices.cell.sum()) + sum(prices.cut_price) + float(np.dot(counts, best))
+        losable = max(0.0, total - floor)
+        found = [
+            worthwhile_routes(instance, robot, prices, most - losable, float(group.get("joule_price", 0)), first, last)
+            for (group, robot, first, last), most in zip(classes, best, strict=True)
+        ]
+        above = [max(most, float(routes.reduced.max(initial=most))) for routes, most in zip(found, best, strict=True)]
+        if np.allclose(above, best, rtol=1e-9, atol=1e-9):
+            break
+        best = above
+    price = np.where(part.must, np.inf, prices.cell)
+    return best_of(found, best, counts, price, losable, floor)
 
 
 def _rounded(instance: OrosInstance, bound: float) -> float:

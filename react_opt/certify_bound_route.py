@@ -16,13 +16,14 @@ from react_opt.instance import OrosInstance, OrosRobot
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
+Rests = list[tuple[float, Floats]]
 NEVER = -np.inf
 ONE = np.uint64(1)
 MARGIN = 1e-9
 FAR = 12
 
 
-class _States(NamedTuple):
+class States(NamedTuple):
     """Partial routes in one cell at one instant: value after prices, memory, cut states, energy used."""
 
     value: Floats
@@ -44,12 +45,32 @@ class Prices(NamedTuple):
     rows_worth: float
 
 
-class _Moves(NamedTuple):
+class Moves(NamedTuple):
     """Arcs by the cell they leave: (to, steps, energy)."""
 
     out: list[list[tuple[int, int, float]]]
     idle_j: float
     sense_j: float
+
+
+def moves_of(instance: OrosInstance, robot: OrosRobot) -> Moves:
+    """Return the moves of a robot."""
+    index = {cell.id: i for i, cell in enumerate(instance.cells)}
+    moves = Moves([[] for _ in index], robot.idle_w * instance.step_s, robot.sensing_w * instance.step_s)
+    for arc in instance.travel:
+        moves.out[index[arc.from_]].append((index[arc.to], arc.steps, arc.energy_j))
+    return moves
+
+
+def gains(
+    instance: OrosInstance, prices: Prices, robot: OrosRobot, first: NDArray[np.int64], last_of: NDArray[np.int64]
+) -> Floats:
+    """Return ``(T + 1, n)``: what sensing is worth after prices; minus infinity where it is out of the question."""
+    n, last = len(instance.cells), instance.horizon_steps
+    gain = np.array([[_gain(instance, prices, robot, i, t) for i in range(n)] for t in range(last + 1)])
+    instant = np.arange(last + 1)[:, None]
+    allowed: Floats = np.where((instant < first) | (instant > last_of), NEVER, gain)
+    return allowed
 
 
 def _gain(instance: OrosInstance, prices: Prices, robot: OrosRobot, cell: int, t: int) -> float:
@@ -96,57 +117,50 @@ def best_route(
     """
     n, last = len(instance.cells), instance.horizon_steps
     index = {cell.id: i for i, cell in enumerate(instance.cells)}
-    moves = _Moves([[] for _ in range(n)], robot.idle_w * instance.step_s, robot.sensing_w * instance.step_s)
-    for arc in instance.travel:
-        moves.out[index[arc.from_]].append((index[arc.to], arc.steps, arc.energy_j))
+    moves = moves_of(instance, robot)
     end = None if robot.return_to is None else index[robot.return_to]
     budget = robot.battery_j - robot.reserve_j
     budget += 1e-9 * max(1.0, budget)
-    gain = np.array([[_gain(instance, prices, robot, i, t) for i in range(n)] for t in range(last + 1)])
-    instant = np.arange(last + 1)[:, None]
-    gain = np.where((instant < first) | (instant > last_of), NEVER, gain)
+    gain = gains(instance, prices, robot, first, last_of)
     later = np.zeros((last + 2, n))
     later[: last + 1] = np.maximum.accumulate(np.maximum(gain, 0.0)[::-1])[::-1]
-    ahead = [_steps_to(moves, i, near) for i, near in enumerate(prices.memory)]
+    ahead = [distances(moves, i, near) for i, near in enumerate(prices.memory)]
     constant = instance.sigma * robot.battery_j
     cutoff = claimed - constant
-    rests = [
-        (rate, _rest(instance, robot, prices, moves, gain, end, rate))
-        for rate in ([0.0, joule_price] if joule_price > 0 else [0.0])
-    ]
-    waiting: list[dict[int, list[_States]]] = [{} for _ in range(last + 1)]
+    rests = rests_of(instance, robot, prices, moves, gain, end, joule_price)
+    waiting: list[dict[int, list[States]]] = [{} for _ in range(last + 1)]
     nothing = np.zeros(1, dtype=np.uint64)
-    start = _States(np.zeros(1), nothing, nothing, np.zeros(1))
+    start = States(np.zeros(1), nothing, nothing, np.zeros(1))
     waiting[robot.start_step][index[robot.start]] = [start]
     best = cutoff
     for t in range(robot.start_step, last + 1):
         for i, parts in waiting[t].items():
-            states = _joined(parts)
+            states = joined(parts)
             states = states._replace(value=states.value - prices.stand.get((t, i), 0.0))
             states = _hopeful(states, t, i, rests, budget, best)
             states = _undominated(
-                _sensed(states, i, gain[t, i], moves.sense_j, prices),
+                sensed(states, i, gain[t, i], moves.sense_j, prices),
                 later[np.minimum(t + ahead[i], last + 1), prices.memory[i]],
                 prices,
             )
-            states = _pick(states, states.used_j <= budget)
+            states = pick(states, states.used_j <= budget)
             if len(states.value) == 0:
                 continue
             if t == last:
                 if end is None or end == i:
                     best = max(best, float(states.value.max()))
                 continue
-            idle = _States(
+            idle = States(
                 states.value - instance.sigma * moves.idle_j, states.memory, states.cuts, states.used_j + moves.idle_j
             )
             waiting[t + 1].setdefault(i, []).append(idle)
             for j, steps, energy in moves.out[i]:
                 if t + steps <= last:
                     waiting[t + steps].setdefault(j, []).append(
-                        _States(
+                        States(
                             states.value - instance.sigma * energy,
-                            _remembered(states.memory, prices.memory[i], prices.memory[j]),
-                            states.cuts & _cut_mask(prices, j),
+                            remembered(states.memory, prices.memory[i], prices.memory[j]),
+                            states.cuts & cut_mask(prices, j),
                             states.used_j + energy,
                         )
                     )
@@ -154,7 +168,7 @@ def best_route(
     return best + constant
 
 
-def _steps_to(moves: _Moves, cell: int, targets: list[int]) -> NDArray[np.int64]:
+def distances(moves: Moves, cell: int, targets: list[int]) -> NDArray[np.int64]:
     """Return the fewest steps from a cell to others, at least 1 (a cell cannot be sensed anew at once)."""
     known = {cell: 0}
     queue = [(0, cell)]
@@ -169,11 +183,25 @@ def _steps_to(moves: _Moves, cell: int, targets: list[int]) -> NDArray[np.int64]
     return np.array([max(1, known.get(target, FAR + 1)) for target in targets], dtype=np.int64)
 
 
+def rests_of(
+    instance: OrosInstance,
+    robot: OrosRobot,
+    prices: Prices,
+    moves: Moves,
+    gain: Floats,
+    end: int | None,
+    joule_price: float,
+) -> Rests:
+    """Return bounds without memory on the rest of a route, each with the price of a joule at which it holds."""
+    rates = [0.0, joule_price] if joule_price > 0 else [0.0]
+    return [(rate, _rest(instance, robot, prices, moves, gain, end, rate)) for rate in rates]
+
+
 def _rest(
     instance: OrosInstance,
     robot: OrosRobot,
     prices: Prices,
-    moves: _Moves,
+    moves: Moves,
     gain: Floats,
     end: int | None,
     rate: float,
@@ -202,33 +230,31 @@ def _rest(
     return rest
 
 
-def _hopeful(
-    states: _States, t: int, cell: int, rests: list[tuple[float, Floats]], budget: float, best: float
-) -> _States:
+def _hopeful(states: States, t: int, cell: int, rests: Rests, budget: float, best: float) -> States:
     """Return the states that may still end above ``best``."""
     keep = np.ones(len(states.value), dtype=bool)
     for rate, rest in rests:
         keep &= states.value + rest[t, cell] + rate * (budget - states.used_j) > best + MARGIN * max(1.0, abs(best))
-    return _pick(states, keep & (states.used_j <= budget))
+    return pick(states, keep & (states.used_j <= budget))
 
 
-def _sensed(states: _States, cell: int, gain: float, sense_j: float, prices: Prices) -> _States:
+def sensed(states: States, cell: int, gain: float, sense_j: float, prices: Prices) -> States:
     """Return the states and, where the cell is not remembered, their twins that collect it."""
     if gain == NEVER:
         return states
     bit = ONE << np.uint64(prices.memory[cell].index(cell))
-    fresh = _pick(states, (states.memory & bit) == 0)
+    fresh = pick(states, (states.memory & bit) == 0)
     value, cuts = fresh.value + gain, fresh.cuts
     for k, cells in enumerate(prices.cut_cells):
         if cell in cells:
             mark = ONE << np.uint64(k)
             value = value - prices.cut_price[k] * ((cuts & mark) != 0)
             cuts = cuts ^ mark
-    twins = _States(value, fresh.memory | bit, cuts, fresh.used_j + sense_j)
-    return _joined([states, twins])
+    twins = States(value, fresh.memory | bit, cuts, fresh.used_j + sense_j)
+    return joined([states, twins])
 
 
-def _remembered(memory: Words, here: list[int], there: list[int]) -> Words:
+def remembered(memory: Words, here: list[int], there: list[int]) -> Words:
     """Return memories carried from one place to another: what is remembered in both."""
     if here == there:
         return memory
@@ -240,7 +266,7 @@ def _remembered(memory: Words, here: list[int], there: list[int]) -> Words:
     return carried
 
 
-def _cut_mask(prices: Prices, cell: int) -> np.uint64:
+def cut_mask(prices: Prices, cell: int) -> np.uint64:
     """Return the cuts whose state survives in a cell."""
     mask = 0
     for k, cells in enumerate(prices.cut_memory):
@@ -249,14 +275,14 @@ def _cut_mask(prices: Prices, cell: int) -> np.uint64:
     return np.uint64(mask)
 
 
-def _undominated(states: _States, later: Floats, prices: Prices) -> _States:
+def _undominated(states: States, later: Floats, prices: Prices) -> States:
     """Return the states that no other beats whatever comes next.
 
     A state that remembers more, or has more odd cuts, still beats another if it is ahead by all that the other
     could gain from that: ``later`` is the most that each remembered cell can still earn.
     """
     order = np.lexsort((states.used_j, -states.value))
-    states = _pick(states, order)
+    states = pick(states, order)
     keep = np.ones(len(order), dtype=bool)
     for k in range(len(order)):
         if not keep[k]:
@@ -269,15 +295,17 @@ def _undominated(states: _States, later: Floats, prices: Prices) -> _States:
             if (states.cuts[k] >> np.uint64(cut)) & ONE:
                 lead = lead - price * (((states.cuts[rest] >> np.uint64(cut)) & ONE) == 0)
         keep[rest] &= ~((lead >= 0.0) & (states.used_j[k] <= states.used_j[rest]))
-    return _pick(states, keep)
+    return pick(states, keep)
 
 
-def _pick(states: _States, keep: NDArray[np.bool_] | NDArray[np.int64]) -> _States:
-    return _States(states.value[keep], states.memory[keep], states.cuts[keep], states.used_j[keep])
+def pick(states: States, keep: NDArray[np.bool_] | NDArray[np.int64]) -> States:
+    """Return some of the states."""
+    return States(states.value[keep], states.memory[keep], states.cuts[keep], states.used_j[keep])
 
 
-def _joined(parts: list[_States]) -> _States:
-    return _States(
+def joined(parts: list[States]) -> States:
+    """Return several batches of states as one."""
+    return States(
         np.concatenate([part.value for part in parts]),
         np.concatenate([part.memory for part in parts]),
         np.concatenate([part.cuts for part in parts]),

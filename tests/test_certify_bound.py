@@ -128,6 +128,30 @@ def test_the_bound_of_a_tree_is_recomputed_from_its_leaves(seed: int, monkeypatc
             recompute_bound(instance, forged)
 
 
+def test_a_bound_that_rests_on_enumeration_is_recomputed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without cuts and memory the routes of a better plan are enumerated; claims that are too low are found out."""
+    enumerated = 0
+    for seed in range(14):
+        instance = _walled(seed)
+        problem = route_problem(instance)
+        best = solve_routes(problem, work_limit=6000).objective
+        assert best is not None
+        with monkeypatch.context() as weak:
+            weak.setattr(engine, "FIRST_MEMORY", 1)
+            weak.setattr(Tightening, "cut", lambda self: False)
+            weak.setattr(Tightening, "grow_memory", lambda self: False)
+            result = solve_routes(problem, work_limit=6000)
+        proof = result.certificate
+        assert result.objective == pytest.approx(best, rel=1e-8)
+        assert best - 1e-9 * best <= recompute_bound(instance, proof) <= result.bound + 1e-8 * best
+        if proof.get("enumerated", False):
+            enumerated += 1
+            assert recompute_bound(instance, {**proof, "bound": proof["bound"] - 2.5}) >= best - 1e-9 * best
+            forged = {**proof, "classes": [{**group, "best": group["best"] - 3.0} for group in proof["classes"]]}
+            assert recompute_bound(instance, forged) >= best - 1e-9 * best
+    assert enumerated >= 3
+
+
 def _lower(node: dict) -> None:
     """Make every leaf of a certificate claim three less for each class."""
     if "cell" in node:

@@ -18,6 +18,7 @@ def certificate(
     memory: Memory,
     best: Multipliers,
     joule_price: Sequence[float],
+    enumerated: float | None = None,
 ) -> dict[str, Any]:
     """Return the certificate of a bound.
 
@@ -36,10 +37,13 @@ def certificate(
     joule_price
         For each class a price of a joule at which the battery may be relaxed; it speeds up the recomputation and
         is of no consequence for the bound.
+    enumerated
+        A smaller bound that rests on the enumeration of all routes that lose less than it lies below the
+        multipliers' own.
     """
     return {
         "kind": "lagrangian",
-        **_prices(problem, best, joule_price),
+        **_prices(problem, best, joule_price, enumerated),
         "memory": _remembered(memory),
     }
 
@@ -65,6 +69,8 @@ def tree_certificate(problem: RouteProblem, memory: Memory, root: Part, joule_pr
     def written(part: Part) -> dict[str, Any]:
         split = part.split
         if split is None or part.yes is None or part.no is None:
+            if part.enumerated is not None and part.enumerated[1] <= part.bound:
+                return _prices(problem, part.enumerated[0], joule_price, part.enumerated[1])
             return _prices(problem, part.known, joule_price)
         robots = list(problem.classes[split.group].robots)
         question = {"robots": robots} if split.by is None else {"by": split.by}
@@ -72,7 +78,7 @@ def tree_certificate(problem: RouteProblem, memory: Memory, root: Part, joule_pr
 
     def proven(part: Part) -> float:
         if part.split is None or part.yes is None or part.no is None:
-            return part.known.bound
+            return part.bound
         return max(proven(part.yes), proven(part.no))
 
     return {"kind": "tree", "bound": proven(root), "memory": _remembered(memory), "tree": written(root)}
@@ -82,7 +88,9 @@ def _remembered(memory: Memory) -> str | list[list[int]]:
     return "all" if memory.complete else [sorted(cells) for cells in memory.near]
 
 
-def _prices(problem: RouteProblem, best: Multipliers, joule_price: Sequence[float]) -> dict[str, Any]:
+def _prices(
+    problem: RouteProblem, best: Multipliers, joule_price: Sequence[float], enumerated: float | None = None
+) -> dict[str, Any]:
     """Return the prices of a bound."""
     priced_cuts = [
         {"cells": sorted(cut.cells), "memory": sorted(cut.memory), "price": float(price)}
@@ -101,7 +109,7 @@ def _prices(problem: RouteProblem, best: Multipliers, joule_price: Sequence[floa
             continue
         priced_rows.append({**place, "price": float(price)})
     return {
-        "bound": float(best.bound),
+        **({"bound": float(best.bound)} if enumerated is None else {"bound": float(enumerated), "enumerated": True}),
         "cell_price": [float(price) for price in best.duals.cell],
         "classes": [
             {"robots": list(group.robots), "best": float(worth), "joule_price": float(rate)}

@@ -17,7 +17,7 @@ from react_opt.route_problem import FloatArray
 from react_opt.solvers.routes.columns import Column, Rank1Cut
 
 LEAST_VIOLATION = 0.02
-MOST_PER_CELL = 4
+MOST_PER_CELL = 8
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class SubsetRow:
 
     def coefficient(self, column: Column) -> float:
         """Return how often the column's route collects two of the cells without forgetting in between."""
-        if sum(cell in self.cells for cell in column.cells) < 2:
+        if sum(map(column.cells.count, self.cells)) < 2:
             return 0.0
         route = column.path
         odd, times = False, 0

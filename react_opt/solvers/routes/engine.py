@@ -102,7 +102,7 @@ class _Proof:
         self.master = Master(problem.n_cells, self.counts, 2.0 * most + 1.0, threads)
         self.generation = Generation(self.master, self.pricer, standing)
         self.tightening = Tightening(self.generation, self.memory)
-        self.finish = Finish(self.generation, standing, threads, seed)
+        self.finish = Finish(self.generation, standing)
         self.notes: list[str] = []
         self.proof: dict[str, Any] = {}
         self._searches = 0
@@ -143,28 +143,40 @@ class _Proof:
             self._improve()
             assert self.generation.best is not None
             bound = self.generation.best.bound
-            if standing.done():
+            if standing.done() or self._finished():
                 return False
             gap = np.inf if standing.objective is None else bound - standing.objective
             stalled = 0 if before - bound > WORTH_IT * gap else stalled + 1
-            if self.tightening.heavy() or stalled == PATIENCE or not self.tightening.tighten(cut=stalled > 0):
+            if self.tightening.heavy() or stalled == PATIENCE or not self.tightening.tighten():
                 return True
             before = bound
         return False
+
+    def _finished(self) -> bool:
+        """Enumerate the routes that a better plan can contain; return whether that ends the search."""
+        best = self.generation.best
+        assert best is not None
+        bound = self.finish.bound(best)
+        if bound is not None and self.standing.lower_bound_to(bound):
+            self.proof = certificate(self.problem, self.memory, best, self.pricer.joule_prices, bound)
+        return self.standing.done()
 
     def _branch(self) -> None:
         """Search the tree."""
         assert self.generation.best is not None
         tree = Tree(self.generation, self.tightening, self.finish, self.standing, self.generation.best)
         tree.run()
-        if tree.root.split is not None:
-            self.proof = tree_certificate(self.problem, self.memory, tree.root, self.pricer.joule_prices)
+        proof = tree_certificate(self.problem, self.memory, tree.root, self.pricer.joule_prices)
+        if tree.root.split is not None and proof["bound"] < self.proof["bound"]:
+            self.proof = proof
         self.notes += tree.notes()
 
     def result(self) -> RoutesResult:
         """Return what is known."""
         standing = self.standing
         proven = standing.proven()
+        if self.finish.routes:
+            self.notes.append(f"bound rests on the enumeration of {self.finish.routes} routes")
         status: Status = "optimal" if proven else "feasible" if standing.routes is not None else "no_plan"
         return RoutesResult(
             standing.routes,

@@ -10,13 +10,14 @@ robots make a worse route with the same cells useful.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
 from react_opt.route_problem import FloatArray, IntArray
-from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut
+from react_opt.solvers.routes.columns import Duals, Rank1Cut
 from react_opt.solvers.routes.labels import at_most, completed, lowest_bit
 from react_opt.solvers.routes.labelstore import NEVER, ORIGIN, WAIT, Fuel, Graph, Labels, MaskArray, Prices
 from react_opt.solvers.routes.pricing import NO_SIDE_PRICES, RoutePricer, SidePrices
@@ -39,12 +40,13 @@ def grow_sets(
     cutoff: float,
     max_labels: int,
     stop: NDArray[np.uint8],
-) -> tuple[Labels, NDArray[np.uint64], bool]:
+) -> tuple[Labels, MaskArray, FloatArray, bool]:
     """Return one label per cell, instant and exact set of cells that may end at ``cutoff`` or more.
 
     The value of a label leaves out the prices of cuts that it has paid; they are kept apart because labels with
     the same set compare by what they are worth in the plan. The second result is ``(n_labels, n_words)`` the
-    exact sets, the third whether the enumeration is complete. Parameters as for ``grow_labels``.
+    exact sets, the third the prices paid, the last whether the enumeration is complete. Parameters as for
+    ``grow_labels``.
     """
     n = len(graph.in_start) - 1
     last = len(prices.gain) - 1
@@ -234,7 +236,33 @@ def grow_sets(
         arc[:count],
         sensed[:count],
     )
-    return labels, sets[:count], complete
+    return labels, sets[:count], paid_all[:count], complete
+
+
+@dataclass(frozen=True)
+class Enumerated:
+    """The best route of a class for each set of cells.
+
+    Parameters
+    ----------
+    labels
+        All labels of the enumeration.
+    label, cell
+        ``(m,)`` the last label of each route and the cell in which it ends.
+    reduced
+        ``(m,)`` value minus prices, the group's multiplier not deducted.
+    value
+        ``(m,)`` value in the objective, to rounding.
+    sets
+        ``(m, words)`` cells collected.
+    """
+
+    labels: Labels
+    label: IntArray
+    cell: IntArray
+    reduced: FloatArray
+    value: FloatArray
+    sets: MaskArray
 
 
 def enumerate_routes(
@@ -246,11 +274,10 @@ def enumerate_routes(
     cuts: Sequence[Rank1Cut] = (),
     *,
     max_labels: int = 500_000,
-    max_routes: int = 50_000,
-) -> list[Column] | None:
+) -> Enumerated | None:
     """Return the best route for every set of cells whose value minus prices reaches ``floor``.
 
-    None if there are more labels or routes than allowed.
+    None if there are more labels than allowed.
 
     Parameters
     ----------
@@ -262,14 +289,14 @@ def enumerate_routes(
         Prices; ``side`` may forbid but not price standing or sensing.
     floor
         Least value minus prices, the group's multiplier not deducted.
-    max_labels, max_routes
-        Limits beyond which the enumeration is given up.
+    max_labels
+        Limit beyond which the enumeration is given up.
     """
     ahead, fuel, bound, behind, cutoff = pricer.completions(group, duals, floor, side, cuts)
     if behind is None:
         return None
     data, n = pricer.problem.classes[group], pricer.problem.n_cells
-    labels, sets, complete = grow_sets(
+    labels, sets, paid, complete = grow_sets(
         pricer.forward,
         ahead,
         fuel,
@@ -285,10 +312,13 @@ def enumerate_routes(
         return None
     first = int(labels.start[pricer.problem.horizon * n])
     chosen = _best_per_set(labels.value[first:], sets[first:], pricer.allowed_end(group, labels))
-    if len(chosen) > max_routes:
-        return None
-    cell = np.searchsorted(labels.start[pricer.problem.horizon * n :], first + chosen, side="right") - 1
-    return [pricer.column(group, labels, first + int(k), int(j)) for k, j in zip(chosen, cell, strict=True)]
+    label = first + chosen
+    cell = np.searchsorted(labels.start[pricer.problem.horizon * n :], label, side="right") - 1
+    constant = floor - cutoff
+    held = sets[label]
+    inside = np.unpackbits(held.view(np.uint8), axis=1, bitorder="little")[:, :n]
+    value = labels.value[label] + constant
+    return Enumerated(labels, label, cell, value - paid[label], value + inside @ duals.cell, held)
 
 
 def _best_per_set(value: FloatArray, sets: MaskArray, allowed: NDArray[np.bool_]) -> IntArray:

@@ -12,9 +12,9 @@ from react_opt.solvers.routes.memory import Memory
 from react_opt.solvers.routes.rows import violated_limits
 
 MOST_CUTS = 64
-MOST_CUTS_AT_ONCE = 10
+MOST_CUTS_AT_ONCE = 25
 TINY = 1e-6
-HEAVY = 3.0  # times the labels of the first pricings
+HEAVY = 6.0  # times the labels of the first pricings
 
 
 class Tightening:
@@ -44,18 +44,10 @@ class Tightening:
         self.master.add_rows(rows)
         return bool(rows)
 
-    def tighten(self, *, cut: bool = True) -> bool:
-        """Let the memory grow and add cuts; return whether anything changed.
-
-        Parameters
-        ----------
-        cut
-            False adds cuts only where the memory does not grow.
-        """
-        if cut:
-            added = self.cut()
-            return self.grow_memory() or added
-        return self.grow_memory() or self.cut()
+    def tighten(self) -> bool:
+        """Add cuts and let the memory grow; return whether anything changed."""
+        added = self.cut()
+        return self.grow_memory() or added
 
     def heavy(self) -> bool:
         """Return whether the pricing since the last call took many times the labels that it took at first."""

@@ -22,8 +22,6 @@ CANDIDATES = 8
 LEAST_SHARE = 0.02  # of a cell on either side of a split
 ROUNDS = 3  # of tightening in one part
 WORTH_IT = 0.1  # share of the gap that a round has to close for another one
-MANY_PARTS = 60  # beyond which a part may be finished by enumeration
-EASY_ROUTES, LAST_ROUTES = 3_000, 20_000
 
 
 @dataclass
@@ -41,7 +39,7 @@ class Part:
     split, yes, no
         The question by which it has been split and the parts that answer it.
     enumerated
-        Whether the bound rests on enumeration.
+        Multipliers and bound of an enumeration, if the part's bound rests on one.
     """
 
     region: Region
@@ -50,7 +48,7 @@ class Part:
     split: Split | None = None
     yes: Part | None = None
     no: Part | None = None
-    enumerated: bool = False
+    enumerated: tuple[Multipliers, float] | None = None
 
 
 class Tree:
@@ -121,40 +119,38 @@ class Tree:
             self._offer(generation.point)
             if self.tightening.add_limits():
                 continue
+            if self._enumerated(part):
+                return
             gained = standing.objective is None or before - part.bound > WORTH_IT * (part.bound - standing.objective)
             if self.tightening.heavy() or rounds == ROUNDS or (rounds > 0 and not gained):
                 break
             if not self.tightening.tighten():
                 break
             rounds += 1
-        if self.parts > MANY_PARTS and self._enumerated(part, EASY_ROUTES):
-            return
         split = self._choose(part)
         if split is None:
-            self._enumerated(part, LAST_ROUTES)
+            self._enumerated(part, anew=True)
             return
         part.split = split
-        part.yes = Part(part.region.side(split, True), part.known, part.bound)
-        part.no = Part(part.region.side(split, False), part.known, part.bound)
+        part.yes = Part(part.region.side(split, True), part.known, part.bound, enumerated=part.enumerated)
+        part.no = Part(part.region.side(split, False), part.known, part.bound, enumerated=part.enumerated)
         self._push(part.yes)
         self._push(part.no)
 
-    def _enumerated(self, part: Part, most: int) -> bool:
-        """Finish a part by enumeration; return whether it was possible."""
-        bound = self.finish.bound(part.known, most, anew=most > EASY_ROUTES)
+    def _enumerated(self, part: Part, *, anew: bool = False) -> bool:
+        """Lower a part's bound by enumeration; return whether that closes it."""
+        bound = self.finish.bound(part.known, anew=anew)
         if bound is None:
             return False
-        part.bound, part.enumerated = min(part.bound, bound), True
-        return True
+        if bound < part.bound:
+            part.bound, part.enumerated = bound, (part.known, bound)
+        return self.standing.proven(self.standing.lattice.round_down(part.bound))
 
     def notes(self) -> list[str]:
         """Return how the bound came about, in words."""
-        if self.parts == 1 and not self.root.enumerated:
+        if self.parts == 1:
             return []
-        notes = [f"bound from a tree of {self.parts} parts, split by when cells are collected"]
-        if self.finish.routes:
-            notes.append(f"parts of it rest on the enumeration of {self.finish.routes} routes, solved as MILPs")
-        return notes
+        return [f"bound from a tree of {self.parts} parts, split by when cells are collected"]
 
     def _offer(self, point: MasterPoint | None) -> None:
         """Offer the linear programme's own plan, if it is whole."""
