@@ -46,7 +46,8 @@ def search(arrays: InspectionArrays, seconds: float, seed: int, tell: Tell | Non
     routes: Routes = [[] for _ in arrays.time_s]
     for route in best.routes():
         routes[route.vehicle_type()] = [stop.idx for stop in route if stop.is_client()]
-    return routes
+    # PyVRP leaves vehicles unused, whose robots may be unable to get to their ends without a target on the way.
+    return routes if arrays.is_feasible(routes) else None
 
 
 def _prize(arrays: InspectionArrays) -> int:

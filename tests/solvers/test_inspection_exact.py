@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.families import FAMILIES
 from react_opt import jsonio
 from react_opt.certify_inspection import check_inspection
 from react_opt.errors import InputError
@@ -318,3 +319,12 @@ def test_a_control_counts_work_and_raises_its_flag() -> None:
         assert control.stopped()
         assert control.limit == "work"
     assert control.flag[0] == 1
+
+
+def test_a_stiff_first_program_is_no_reason_to_stop() -> None:
+    # Here a robot only gets to its end by way of targets, so no plan is there from the start, and HiGHS gives up on the
+    # second linear program once. 124 is what the integer program over all routes within the gap gives, the bound too.
+    instance = jsonio.parse(FAMILIES["inspection_tight"].make(robots=4, targets=30, seed=2))
+    plan = solve_inspection(instance, SolveOptions(explain=False))
+    assert (plan.claim.status, plan.claim.objective, plan.claim.bound) == ("optimal", 124.0, 124.0)
+    assert check_inspection(instance, plan).ok

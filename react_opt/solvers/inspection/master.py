@@ -159,8 +159,7 @@ class Master:
 
     def solve(self) -> Duals | None:
         """Solve the linear program; None where the solver gives no optimum."""
-        self._solver.run()
-        if self._solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+        if not self._optimal():
             return None
         solution = self._solver.getSolution()
         dual = np.array(solution.row_dual)
@@ -171,6 +170,16 @@ class Master:
         stand_in = float(np.array(solution.col_value)[:groups].sum())
         cuts = np.minimum(dual[n + groups + 1 :], 0.0)
         return Duals(np.minimum(dual[:n], 0.0), dual[n : n + groups], worth, objective, stand_in, cuts)
+
+    def _optimal(self) -> bool:
+        """Run the simplex method; once more from scratch where it gives up: stand-ins make the first programs stiff."""
+        for again in (False, True):
+            if again:
+                self._solver.clearSolver()
+            self._solver.run()
+            if self._solver.getModelStatus() == highspy.HighsModelStatus.kOptimal:
+                return True
+        return False
 
 
 def broken_triples(visits: NDArray[np.bool_], x: FloatArray, most: int) -> list[tuple[int, int, int]]:
