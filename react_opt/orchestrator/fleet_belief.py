@@ -26,6 +26,9 @@ from react_opt.orchestrator.belief_regions import flood
 SNAP_M = 0.5
 """A point is driven to, or left from, at the nearest place within this where the robot can stand."""
 
+BODY_MARGIN_M = 0.06
+"""Room that is planned for between a robot and one that died, m."""
+
 IntArray = NDArray[np.int64]
 Slowness = NDArray[np.float32]
 _LOOK_RAYS = 360
@@ -48,6 +51,8 @@ class FleetBelief:
         LiDAR range that local targets are judged by, m.
     prior
         A sketch of the building, which may be wrong.
+    bodies_block
+        Whether robots that died stand in the way of the others.
     """
 
     def __init__(
@@ -59,6 +64,7 @@ class FleetBelief:
         *,
         range_m: float = 8.0,
         prior: OccupancyMap | None = None,
+        bodies_block: bool = True,
     ) -> None:
         self._profiles = sorted(dict.fromkeys(profiles), key=lambda profile: profile.radius_m)
         radii = tuple(sorted({profile.radius_m for profile in self._profiles}))
@@ -75,7 +81,8 @@ class FleetBelief:
         self._fresh = (-1, -1)
         self._slow: dict[tuple[int, bool], Slowness] = {}
         self._fields: dict[tuple[int, bool, int], Field] = {}
-        self._planned = -1
+        self._planned: tuple[int, tuple[str, ...]] = (-1, ())
+        self._bodies_block = bodies_block
         self._marks = np.zeros((1, 1), dtype=np.int32)
         self._mark = 0
         self.t_s = 0.0
@@ -304,8 +311,17 @@ class FleetBelief:
         key = (self._profiles.index(profile), optimistic)
         if key not in self._slow:
             passable = self._map.passable(self._layer[profile], optimistic)
-            self._slow[key] = slowness(self._map.clear, passable, profile, self._map.frame.resolution_m)
+            slow = slowness(self._map.clear, passable, profile, self._map.frame.resolution_m)
+            self._slow[key] = without_discs(slow, self._discs(self._bodies(profile)), 0.0)
         return self._slow[key]
+
+    def _dead(self) -> list[RobotView]:
+        return [robot for robot in self._robots.values() if robot.state == "dead" and self._bodies_block]
+
+    def _bodies(self, profile: RobotProfile) -> list[tuple[float, float, float]]:
+        """Return the discs that the centre of a robot stays out of, because dead ones stand there."""
+        reach = profile.radius_m + BODY_MARGIN_M
+        return [(robot.x_m, robot.y_m, reach + robot.profile.radius_m) for robot in self._dead()]
 
     def _field(self, profile: RobotProfile, start: int, optimistic: bool) -> Field:
         slow = self._slowness(profile, optimistic)
@@ -337,9 +353,10 @@ class FleetBelief:
         return rows
 
     def _forget(self) -> None:
-        if self._planned != self._map.version:
+        facts = (self._map.version, tuple(robot.id for robot in self._dead()))
+        if self._planned != facts:
             self._areas.fit()
-            self._planned = self._map.version
+            self._planned = (self._map.version, facts[1])  # fitting may have changed the map
             self._slow.clear()
             self._fields.clear()
 

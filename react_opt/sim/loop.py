@@ -77,7 +77,9 @@ class Simulation:
         self.mission = mission
         self.world = World(truth, min(profile.radius_m for profile in used), range_m, starts)
         extent_m = mission.extent_m or self.world.extent_m(mission.cell_m)
-        self.belief = FleetBelief(truth, extent_m, mission.cell_m, used, range_m=range_m, prior=prior)
+        self.belief = FleetBelief(
+            truth, extent_m, mission.cell_m, used, range_m=range_m, prior=prior, bodies_block=mission.blocking
+        )
         self.strategy = make_strategy(mission.strategy, options_of(mission)) if strategy is None else strategy
         seeds = np.random.SeedSequence(mission.seed).spawn(len(mission.robots))
         self.robots = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -231,3 +232,34 @@ def test_would_see_counts_what_a_scan_would_reveal() -> None:
     shown(belief, truth, 0, 60)
     assert belief.would_see((2.0, 5.0), 3.0) == 0
     assert belief.would_see((5.9, 5.0), 3.0) > 1000
+
+
+def test_a_dead_robot_stands_in_the_way() -> None:
+    """In a hall the way leads around it; in a corridor too narrow for two it is closed; a living one does not count."""
+    truth = truth_of()
+    belief = belief_of(truth)
+    belief.report(robot_at(2.0, 5.0))
+    belief.report(robot_at(10.0, 5.0, "r2"))
+    shown(belief, truth, 0, 200)
+    goal = np.array([[18.0, 5.0]])
+    (before_s,), _ = belief.costs(belief.robots[0], goal)
+    belief.report(dataclasses.replace(robot_at(10.0, 5.0, "r2"), state="dead"))
+    (after_s,), _ = belief.costs(belief.robots[0], goal)
+    assert after_s > before_s
+    way = np.array(belief.path(belief.robots[0], (18.0, 5.0)))
+    steps = [np.linspace(a, b, 50) for a, b in itertools.pairwise(way)]
+    gap_m = min(float(np.hypot(*(step - (10.0, 5.0)).T).min()) for step in steps)
+    assert gap_m >= 2 * PROFILE.radius_m
+
+    cells = truth.cells.copy()
+    cells[:45, 80:120] = cells[55:, 80:120] = 1  # 1 m wide, and two robots need 2 * 0.67 m
+    narrow = OccupancyMap(cells, 0.1)
+    for blocks in (True, False):
+        belief = belief_of(narrow, bodies_block=blocks)
+        belief.report(robot_at(2.0, 5.0))
+        belief.report(robot_at(10.0, 5.0, "r2"))
+        shown(belief, narrow, 0, 200)
+        assert np.isfinite(belief.costs(belief.robots[0], goal)[0][0])
+        belief.report(dataclasses.replace(robot_at(10.0, 5.0, "r2"), state="dead"))
+        assert np.isfinite(belief.costs(belief.robots[0], goal)[0][0]) == (not blocks)
+        assert (belief.path(belief.robots[0], (18.0, 5.0), optimistic=True) == ()) == blocks
