@@ -146,7 +146,7 @@ def confirmation(run: Run) -> str:
     """Return what became of a bound's certificate.
 
     ``confirmed``: recomputed, and no worse than claimed. ``partly``: weaker than claimed, but the claim's notes say
-    that the bound also rests on an enumeration, which a certificate cannot hold. ``refuted``: weaker, and nothing
+    that the bound also rests on an enumeration that its certificate does not hold. ``refuted``: weaker, and nothing
     else was given. ``not recomputed``: not within its time. ``none``: no certificate.
     """
     certified, bound = run.get("certified"), run.get("bound")
