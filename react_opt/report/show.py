@@ -163,13 +163,10 @@ def _bound(trace: Trace, file: str | Path, notes: list[str]) -> Any:
     from react_opt.limits.curve import coverage_bound
 
     try:
-        bound = coverage_bound(trace)
+        return coverage_bound(trace)
     except UsageError as error:
         notes.append(f"{file}: no bound on the coverage: {error}")
         return None
-    if bound is None:
-        notes.append(f"{file}: no bound on the coverage: a prior map may show anything at once")
-    return bound
 
 
 def _middle_instance(document: AssignmentInstance | InspectionInstance) -> Any:
