@@ -151,7 +151,10 @@ class FreeSpace:
             return None
         x, y = self.source.world_to_pixel(point_m)
         if not (0 <= x <= self.source.cols and 0 <= y <= self.source.rows):
-            return "off the map"
+            corners = [(c, r) for c in (0, self.source.cols) for r in (0, self.source.rows)]
+            placed = self.source.pixel_to_world(corners).round(3)
+            (left, bottom), (right, top) = placed.min(axis=0), placed.max(axis=0)
+            return f"off the map, which lies between ({left:g}, {bottom:g}) and ({right:g}, {top:g}) m"
         value = self.source.values_at(point_m)
         if value == OCCUPIED:
             return "inside an obstacle"

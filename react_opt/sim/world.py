@@ -54,7 +54,9 @@ class World:
         for n, (x, y) in enumerate(self.map.world_to_pixel(starts_m)):
             label = _label_near(labels, x, y, 0.15 / self.map.resolution_m + 1)
             if label == 0:
-                raise UsageError(f"robots[{n}]: the robot cannot stand at its start, {starts_m[n]}")
+                place = f"({starts_m[n][0]:g}, {starts_m[n][1]:g}) m"
+                why = self.space.why_not(starts_m[n]) or "too close to an obstacle"
+                raise UsageError(f"robots[{n}]: the robot cannot stand at its start, {place}: it is {why}")
             reached[label] = True
         return np.asarray(reached[labels])
 

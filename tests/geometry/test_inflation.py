@@ -120,7 +120,7 @@ def test_without_any_obstacle_clearance_is_finite() -> None:
 def test_why_a_point_is_out_of_reach_and_where_the_nearest_is() -> None:
     map_ = room([".......", "...#..?", "......."], origin_x_m=10.0)
     space = inflate(map_, Footprint(0.6), unknown="blocked", refine=1)
-    assert "off the map" in str(space.why_not((0.0, 0.0)))
+    assert "off the map, which lies between (10, 0) and (17, 3) m" in str(space.why_not((0.0, 0.0)))
     assert "inside an obstacle" in str(space.why_not((13.5, 1.5)))
     assert "unknown" in str(space.why_not((16.5, 1.5)))
     assert "0.500 m from an obstacle, less than the footprint's 0.600 m" in str(space.why_not((10.5, 0.5)))

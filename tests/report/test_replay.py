@@ -12,6 +12,7 @@ import shutil
 
 import numpy as np
 import pytest
+from documents import document
 from small_trace import FACTORY, scripted
 
 from react_opt import load, parse, save
@@ -20,7 +21,7 @@ from react_opt.limits.curve import coverage_bound, share_at
 from react_opt.report.replay import replay_page
 from react_opt.report.show import show
 from react_opt.sim.run import simulate
-from react_opt.trace import NEVER
+from react_opt.trace import NEVER, pixel_data
 
 CHROMIUM, DRIVER = shutil.which("chromium") or shutil.which("google-chrome"), shutil.which("chromedriver")
 FLAGS = """
@@ -236,6 +237,71 @@ def test_nothing_is_cut_off_at_any_size(opened, size):
     wide = browser.execute_script("return [document.documentElement.scrollWidth, window.innerWidth]")
     browser.set_window_size(1280, 800)
     assert wide[0] <= wide[1]
+
+
+# --- made-up traces ---
+
+STRANGE = "Küchen-Späher 厨房 </script><b>bold</b>" + "x" * 80
+
+
+def made_up(frames):
+    """Return a trace told by nobody: twelve robots with strange ids, no events, no tracks, a turned map."""
+    names = [f"{k} {STRANGE}" for k in range(12)]
+    profile = document("mission")["profiles"]
+    robots = [{"id": name, "profile": next(iter(profile)), "x_m": 2.0, "y_m": 3.0, "yaw_rad": 0.5} for name in names]
+    grid = {"rows": 9, "cols": 14, "resolution_m": 0.5, "origin_x_m": -3.0, "origin_y_m": 7.25, "origin_yaw_rad": 0.7}
+    known = np.arange(9 * 14, dtype=np.uint16).reshape(9, 14)
+    told = [
+        {
+            "t_s": 5.0 * n,
+            "coverage": round(0.0312 * n, 6),
+            "robots": [
+                {"id": name, "x_m": k / 2, "y_m": 9.0 + n, "yaw_rad": 3.0 * n, "sensing": k % 2 == 0, "battery_j": 0.0}
+                for k, name in enumerate(names)
+                if n != 1 or k != 3  # a frame that does not name every robot
+            ],
+        }
+        for n in range(frames)
+    ]
+    mission = document("mission") | {"name": STRANGE, "robots": robots, "prior_map": None, "failures": [], "link": None}
+    return parse(
+        {
+            "kind": "trace",
+            "mission": mission,
+            "seed": 0,
+            "frames": told,
+            "known": grid | {"unit_s": 0.1, "data": pixel_data(known)},
+            "truth": grid | {"data": pixel_data(np.full((9, 14), 4, dtype=np.uint8))},
+            "events": [],
+        }
+    )
+
+
+@pytest.mark.parametrize("frames", [7, 1, 0])
+def test_a_made_up_trace_opens_and_shows_its_coverage(opened, frames):
+    trace = made_up(frames)
+    browser = opened(trace)
+    end = 5.0 * max(0, frames - 1)
+    for t_s in (0.0, end / 2, end):
+        scrub(browser, t_s)
+        so_far = [frame for frame in trace.frames if frame.t_s <= t_s]
+        assert text(browser, "known-0") == (f"{100 * so_far[-1].coverage:.1f} %" if so_far else "unknown")
+        assert seconds(browser) == t_s
+        assert text(browser, "clock").endswith(f"/ 0:{end:04.1f}")
+    assert text(browser, "title") == STRANGE
+    assert [cell.get_property("textContent") for cell in browser.find_elements("css selector", "td.id")] == [
+        robot.id for robot in trace.mission.robots
+    ]
+    assert browser.find_elements("css selector", "#teams b") == []
+    assert text(browser, "decision-when") == "none yet"
+    assert "NaN" not in browser.execute_script("return document.body.innerText")
+    assert browser.execute_script("return document.getElementById('failure').hidden")
+    browser.find_element("id", "next").click()
+    browser.find_element("id", "play").click()
+    until(browser, lambda: seconds(browser) > 0 or end == 0)
+    width = "return document.querySelector(arguments[0]).getBoundingClientRect().width"
+    wide, beside = (browser.execute_script(width, name) for name in ("td.id", "aside"))
+    assert wide < beside / 2  # long ids do not push batteries and sensors out of sight
 
 
 # --- without a browser ---

@@ -33,7 +33,7 @@ class Replay {
   constructor(traces) {
     this.traces = traces;
     this.stage = new Stage($("canvas"), traces);
-    this.end = this.stage.end;
+    this.end = Math.max(...traces.map((trace) => trace.end));
     this.t = 0;
     this.playing = false;
     this.events = traces.flatMap((trace, k) => trace.events.map((event) => ({ event, k }))).sort((a, b) => a.event.t_s - b.event.t_s);
@@ -61,14 +61,16 @@ class Replay {
       known.append(share, make("small", " of the building known"), most);
       const counts = make("div", "", "counts");
       counts.id = `targets-${k}`;
-      const table = make("table"), head = table.createTHead().insertRow();
+      const table = make("table"), head = table.createTHead().insertRow(), body = table.createTBody();
       for (const name of ["robot", "battery", "sensors", "link", "goes to"]) head.append(make("th", name));
       const rows = trace.robots.map((robot, r) => {
-        const row = table.insertRow(), id = row.insertCell(), battery = row.insertCell();
+        const row = body.insertRow(), id = row.insertCell(), battery = row.insertCell();
         const swatch = make("span", undefined, "swatch"), bar = make("span", undefined, "bar"), fill = make("i");
         swatch.style.background = robot.colour;
         fill.style.background = robot.colour;
         id.append(swatch, make("span", robot.id));
+        id.className = "id";
+        id.title = robot.id;
         const joules = make("span");
         joules.id = `battery-${k}-${r}`;
         bar.append(fill);
@@ -190,10 +192,11 @@ class Replay {
       : [make("span", "no targets yet")]);
     trace.robots.forEach((robot, r) => {
       const row = cells.rows[r], joules = trace.battery[r][i], full = robot.capacity_j || trace.battery[r][0] || 1;
-      row.joules.textContent = Number.isNaN(joules) ? "unknown" : `${Math.round(joules)} J`;
+      const told = Number.isFinite(joules); // whether a frame by now names the robot
+      row.joules.textContent = told ? `${Math.round(joules)} J` : "unknown";
       row.fill.style.width = `${Math.min(100, Math.max(0, 100 * (joules || 0) / full))}%`;
       const trouble = state.trouble.get(robot.id), on = trace.sensing[r][i] > 0;
-      row.sensing.textContent = trouble ?? (on ? "on" : "off");
+      row.sensing.textContent = trouble ?? (told ? on ? "on" : "off" : "unknown");
       row.sensing.className = trouble ? "bad" : on ? "" : "off";
       const down = state.down.has(robot.id) || state.down.has("*");
       row.link.textContent = down ? "down" : "up";

@@ -45,7 +45,7 @@ class Stage {
     this.canvas = canvas;
     this.traces = traces;
     this.pictures = traces.map((trace) => new MapPicture(trace));
-    this.end = Math.max(...traces.map((trace) => trace.end), 1e-9);
+    this.end = Math.max(...traces.map((trace) => trace.end)) || 1; // of the axis: a single instant has one of 1 s
     this.curves = null;
   }
 
@@ -175,7 +175,7 @@ class Stage {
     pen.restore();
     pen.lineWidth = 1;
     const down = state.down.has(robot.id) || state.down.has("*");
-    label(pen, robot.id + (lost ? " lost" : down ? " no link" : ""), x + 10, y - 9, lost || down ? "#b00020" : INK);
+    label(pen, shortened(robot.id) + (lost ? " lost" : down ? " no link" : ""), x + 10, y - 9, lost || down ? "#b00020" : INK);
   }
 
   drawCurves(pen, box, t) {
@@ -201,7 +201,7 @@ class Stage {
     });
     pen.setLineDash([]);
     if (this.traces.some((trace) => trace.most.length)) label(pen, "dotted: at most, any team (proven)", Math.max(one.x + 4, one.x + one.w - 216), one.y + one.h - 8, GREY);
-    const top = Math.max(1e-9, ...this.traces.flatMap((trace) => trace.battery.map((row) => row.reduce((a, b) => Math.max(a, b || 0), 0)))) / 1000;
+    const top = (Math.max(0, ...this.traces.flatMap((trace) => trace.battery.map((row) => row.reduce((a, b) => Math.max(a, b || 0), 0)))) || 1000) / 1000;
     this.frame(pen, two, "battery (kJ) over time (s)", top, t);
     this.traces.forEach((trace, k) => trace.robots.forEach((robot, r) => {
       pen.setLineDash(k ? [5, 3] : []);
@@ -268,6 +268,11 @@ class Stage {
 function niceStep(top, most) {
   const rough = top / most, power = 10 ** Math.floor(Math.log10(rough));
   return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= rough * 0.999);
+}
+
+function shortened(name) {
+  const letters = [...name];
+  return letters.length > 24 ? `${letters.slice(0, 23).join("")}…` : name;
 }
 
 function label(pen, text, x, y, colour) {
