@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from react_opt.errors import UsageError
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.instance import Noise
+from react_opt.jsonio import save
 from react_opt.limits.curve import coverage_bound, share_at
+from react_opt.report.show import show
 from react_opt.sim.loop import Simulation
 from react_opt.trace import Trace, pixel_data
 from tests.sim.missions import TWO_ROOMS, building, mission
@@ -95,3 +98,21 @@ def test_no_bound_without_coverable_pixels_on_huge_maps_or_for_unnamed_robots() 
     huge = trace.truth.model_copy(update={"rows": 1000, "cols": 1501})  # its pixels are not even unpacked
     with pytest.raises(UsageError, match="1,501,000 pixels"):
         coverage_bound(foreign(trace, truth=huge))
+
+
+def test_robots_of_another_building_are_told_where_this_one_lies() -> None:
+    trace = flown(TWO_ROOMS, [(2.0, 2.0)], horizon_s=6.0)
+    away = trace.mission.robots[0].model_copy(update={"x_m": 99.0})
+    elsewhere = trace.mission.model_copy(update={"robots": (away,)})
+    with pytest.raises(UsageError, match=r"its start, \(99, 2\) m: it is off the map, which lies between"):
+        coverage_bound(foreign(trace, mission=elsewhere))
+
+
+def test_show_draws_no_line_above_which_the_trace_lies_and_says_so(tmp_path: Path) -> None:
+    trace = foreign(flown(CORRIDOR, [(1.0, 0.8)], horizon_s=6.0), coverage=lambda frame: 1.0)
+    save(trace, tmp_path / "trace.json")
+    notes = show([tmp_path / "trace.json"], tmp_path / "with.html")
+    assert len(notes) == 1
+    assert "no bound on the coverage: the trace tells of 100.00 % known at 0 s" in notes[0]
+    show([tmp_path / "trace.json"], tmp_path / "without.html", bound=False)
+    assert (tmp_path / "with.html").read_bytes() == (tmp_path / "without.html").read_bytes()
