@@ -69,6 +69,8 @@ class SimRobot:
     power_factor: float = 1.0
     yields_to: str | None = None
     """The robot it makes way for, None while it follows its order."""
+    wedged: bool = False
+    """Whether it stands where it cannot turn as it wants, and works itself free."""
     cap_m_s: float = inf
     """Largest speed that traffic leaves it."""
     anchor: tuple[float, float, float] = (0.0, 0.0, 0.0)

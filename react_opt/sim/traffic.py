@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from math import cos, hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from react_opt.energy import speed_at
 from react_opt.geometry.inflation import clearance_px
 from react_opt.kernels import kernel
-from react_opt.sim.robot import SimRobot
+from react_opt.sim.robot import SimRobot, wrapped
 from react_opt.sim.world import World, footprint_free
 
 BACK_M_S = 0.1
 """How fast a robot that cannot turn creeps away from a wall."""
+LOOK_M = 0.05
+"""How far around it such a robot looks for more clearance."""
 
 
 class Traffic:
@@ -48,6 +50,10 @@ class Traffic:
         cap = robot.speed_factor * speed_at(
             clear_m, profile.radius_m, profile.full_speed_clearance_m, profile.speed_min_m_s, profile.speed_max_m_s
         )
+        if robot.wedged:
+            robot.wedged = bool(robot.path) and clear_m < profile.radius_m and self._work_free(robot, dt, clear_m)
+            if robot.wedged:
+                return
         before = robot.heading_rad
         speed, turning, heading, length = robot.plan_motion(dt, min(cap, robot.cap_m_s))
         u, v = robot.u_m + length * cos(heading), robot.v_m + length * sin(heading)
@@ -61,10 +67,15 @@ class Traffic:
             return
         robot.heading_rad, robot.turning_rad_s = before, 0.0
         if robot.path and clear_m < profile.radius_m + 0.05:
-            self._back_off(robot, dt, clear_m)
+            robot.wedged = self._work_free(robot, dt, clear_m)
 
-    def _back_off(self, robot: SimRobot, dt: float, clear_m: float) -> None:
-        """Creep along the heading, back or forth, away from what keeps a robot from turning."""
+    def _work_free(self, robot: SimRobot, dt: float, clear_m: float) -> bool:
+        """Move a robot that cannot turn towards more clearance; False where it can do nothing.
+
+        It creeps along its heading, back or forth, where that leads away from what is near; else it turns, as far as it
+        can, towards the line on which it does.
+        """
+        robot.speed_m_s, robot.turning_rad_s = 0.0, 0.0
         step = BACK_M_S * dt
         for way in (-step, step):
             u, v = robot.u_m + way * cos(robot.heading_rad), robot.v_m + way * sin(robot.heading_rad)
@@ -72,7 +83,25 @@ class Traffic:
                 continue
             if _clearance(self._world.space.clearance_m, u / self._unit, v / self._unit) > clear_m:
                 robot.u_m, robot.v_m, robot.speed_m_s = u, v, BACK_M_S
-                return
+                return True
+        around = [robot.heading_rad + n * pi / 8 for n in range(16)]
+        best_m, away = max(
+            (self._clear_at(robot.u_m + LOOK_M * cos(angle), robot.v_m + LOOK_M * sin(angle)), angle)
+            for angle in around
+        )
+        if best_m <= clear_m:
+            return False
+        errors = sorted((wrapped(away + back - robot.heading_rad) for back in (0.0, pi)), key=abs)
+        for error in errors:
+            turn = min(max(error, -robot.profile.turn_rad_s * dt), robot.profile.turn_rad_s * dt)
+            heading = wrapped(robot.heading_rad + turn)
+            if turn != 0 and self._free(robot, robot.u_m, robot.v_m, heading):
+                robot.heading_rad, robot.turning_rad_s = heading, turn / dt
+                return True
+        return False
+
+    def _clear_at(self, u: float, v: float) -> float:
+        return _clearance(self._world.space.clearance_m, u / self._unit, v / self._unit)
 
     def _free(self, robot: SimRobot, u: float, v: float, heading: float) -> bool:
         half_l, half_w = robot.profile.length_m / 2 / self._unit, robot.profile.width_m / 2 / self._unit

@@ -213,6 +213,7 @@ def test_importing_the_module_does_not_import_ompl() -> None:
 
 
 def test_an_interrupt_waits_for_the_planner_and_is_not_lost() -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background may have been started without
     # raised inside one of OMPL's callbacks it would abort the whole process
     done = []
 

@@ -10,11 +10,12 @@ from types import ModuleType
 import pytest
 
 from react_opt.certify_trace import check_trace
+from react_opt.geometry.inflation import clearance_px
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.instance import Mission
 from react_opt.orchestrator.belief import Belief
 from react_opt.orchestrator.strategy import Decision, Order
-from react_opt.sim.loop import Simulation
+from react_opt.sim.loop import TICK_S, Simulation
 from react_opt.trace import Trace
 from tests.sim.missions import building, mission
 
@@ -110,3 +111,20 @@ def test_no_deadlock_from_a_tunnel(tunnel: ModuleType, seed: int) -> None:
     """Starts at which earlier rules failed: touching robots, a dead end, a queue from both sides, no room to turn."""
     _, done, _, _ = tunnel.run(seed)
     assert done
+
+
+def test_a_robot_that_cannot_turn_works_itself_free() -> None:
+    """Among three posts it can turn neither way to its goal, and clearance lies beside its heading."""
+    posts = building([(2.2, 1.7, 2.4, 1.9), (1.4, 1.4, 1.6, 1.6), (2.4, 2.5, 2.6, 2.7)], (4.0, 4.0))
+    simulation = Simulation(mission([(0.6, 0.6)]), posts)
+    (robot,) = simulation.robots
+    robot.u_m, robot.v_m, robot.heading_rad, robot.state = 1.68, 1.876, -2.964, "driving"
+    robot.follow([(0.6, 0.6)])
+    clearance = simulation.world.space.clearance_m
+    unit = posts.resolution_m
+    seen = [clearance_px(clearance, robot.u_m / unit, robot.v_m / unit)]
+    for _ in range(round(15.0 / TICK_S)):
+        simulation.traffic.move(TICK_S)
+        seen.append(clearance_px(clearance, robot.u_m / unit, robot.v_m / unit))
+    assert seen[0] < robot.profile.radius_m
+    assert max(seen) >= robot.profile.radius_m
