@@ -118,8 +118,8 @@ def test_a_robot_that_cannot_turn_works_itself_free() -> None:
     posts = building([(2.2, 1.7, 2.4, 1.9), (1.4, 1.4, 1.6, 1.6), (2.4, 2.5, 2.6, 2.7)], (4.0, 4.0))
     simulation = Simulation(mission([(0.6, 0.6)]), posts)
     (robot,) = simulation.robots
-    robot.u_m, robot.v_m, robot.heading_rad, robot.state = 1.68, 1.876, -2.964, "driving"
-    robot.follow([(0.6, 0.6)])
+    robot.u_m, robot.v_m, robot.heading_rad, robot.state = 2.17, 2.37, 0.27, "driving"
+    robot.follow([(3.4, 3.4)])
     clearance = simulation.world.space.clearance_m
     unit = posts.resolution_m
     seen = [clearance_px(clearance, robot.u_m / unit, robot.v_m / unit)]
