@@ -19,6 +19,7 @@ from react_opt import load, parse, save
 from react_opt.instance import Failure, Link
 from react_opt.limits.curve import coverage_bound, share_at
 from react_opt.report.replay import replay_page
+from react_opt.report.replay.blocks import in_blocks
 from react_opt.report.show import show
 from react_opt.sim.run import simulate
 from react_opt.trace import NEVER, pixel_data
@@ -323,3 +324,24 @@ def test_walls_that_nobody_saw_can_be_kept_out_of_the_page():
     never = trace.known.array("<u2") == NEVER
     assert (pixels[never] == 3).all()
     assert (pixels[~never] == trace.truth.array("u1")[~never]).all()
+
+
+def test_fine_pixels_are_shown_in_blocks_that_never_tell_more_than_was_known():
+    trace = scripted()
+    grid = trace.known
+    fine = {"resolution_m": 0.05, "rows": 2 * grid.rows, "cols": 2 * grid.cols}
+    rng = np.random.default_rng(0)
+    known = rng.choice([3, 5, 9, NEVER], (2 * grid.rows, 2 * grid.cols)).astype(np.uint16)
+    truth = rng.choice([0, 1, 2, 4], known.shape).astype(np.uint8)
+    told = {"known": grid.model_copy(update={**fine, "data": pixel_data(known)})}
+    told["truth"] = trace.truth.model_copy(update={**fine, "data": pixel_data(truth)})
+    shown = in_blocks(trace.model_copy(update=told))
+    assert (shown.known.rows, shown.known.cols, shown.known.resolution_m) == (grid.rows, grid.cols, 0.1)
+    times, values = shown.known.array("<u2"), shown.truth.array("u1")
+    for row, col in rng.integers(0, (grid.rows, grid.cols), (200, 2)):
+        part = np.s_[2 * row : 2 * row + 2, 2 * col : 2 * col + 2]
+        ever = known[part] != NEVER
+        assert times[row, col] == (known[part][ever].max() if ever.any() else NEVER)
+        counted = truth[part][ever] if ever.any() else truth[part].ravel()
+        assert (values[row, col] & 3 == 1) == (counted & 3 == 1).any()
+    assert in_blocks(shown) is shown

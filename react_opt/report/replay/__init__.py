@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from react_opt.limits.curve import CoverageBound, share_at
 from react_opt.report.colours import ROBOT_COLOURS
+from react_opt.report.replay.blocks import in_blocks
 from react_opt.report.tracks import on_grid, tracks
 from react_opt.trace import NEVER, Trace, TraceEvent, pixel_data
 
@@ -49,7 +50,8 @@ def replay_page(
     script = "".join((folder / name).read_text(encoding="utf-8") for name in _SCRIPTS)
     style = (folder / "page.css").read_text(encoding="utf-8")
     payload = json.dumps(
-        [_payload(trace, truth, bound) for trace, bound in zip(traces, given, strict=True)], separators=(",", ":")
+        [_payload(in_blocks(trace), truth, bound) for trace, bound in zip(traces, given, strict=True)],
+        separators=(",", ":"),
     )
     parts = {
         "@POLICY@": f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; base-uri 'none'",
