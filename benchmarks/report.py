@@ -228,7 +228,8 @@ def _provenance(found: Results) -> list[page.Block]:
         ),
         page.Text(
             "Every plan was replayed by the independent checker. Objectives, bounds and verdicts of solved instances "
-            "repeat on another machine; times do so as ratios."
+            "repeat on another machine; times do so as ratios. Plans and bounds of runs that their time limit cut "
+            "off depend on the machine; `--compare` asks of them that none contradicts another."
         ),
     ]
 

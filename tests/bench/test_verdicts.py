@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from benchmarks.compare import compare
+from benchmarks.report import Results
 from benchmarks.verdicts import confirmation, exposures, meetings, truth_of
 
 CASE = {"family": "f", "parameters": {}, "seed": 1}
@@ -101,3 +103,27 @@ def test_what_was_found_under_other_limits_is_held_against_an_answer() -> None:
     longer = {**run("a", 10.0, None), "limit_s": 100.0}
     assert faults(longer, run("liar", 8.0, 9.0)) == [("liar", "bound")]
     assert len(meetings([longer, run("liar", 8.0, 9.0), run("b", 7.0, None)])) == 2
+
+
+def of_machine(*runs: Any) -> Results:
+    return Results((), tuple({"sha256": "1", **one} for one in runs), ())
+
+
+def test_cut_off_runs_may_differ_between_machines_but_not_contradict_each_other() -> None:
+    """A slower machine has a worse plan and a worse bound; below another's checked plan no bound may lie."""
+    fast, slow = of_machine(run("a", 10.0, 12.0)), of_machine(run("a", 7.0, 14.0))
+    assert (compare(fast, slow).differences, compare(fast, slow).contradictions) == ([], [])
+    false = of_machine(run("a", 7.0, 9.0))
+    for found in (compare(fast, false), compare(false, fast)):
+        assert (found.solved, found.differences, len(found.contradictions)) == (0, [], 1)
+        assert "9 is beaten by a checked plan of a: 10" in found.contradictions[0]
+    renamed = of_machine(run("a", 7.0, 9.0, sha256="2"))
+    assert compare(fast, renamed).contradictions == []
+    assert "another instance" in compare(fast, renamed).differences[0]
+
+
+def test_what_a_file_refutes_by_itself_is_in_its_own_report() -> None:
+    exposed = of_machine(run("a", 10.0, 12.0), run("liar", 8.0, 9.0))
+    assert compare(exposed, of_machine(run("a", 10.0, 12.0))).contradictions == []
+    proofs = compare(of_machine(run("a", 10.0, 12.0)), of_machine(run("a", None, None, "infeasible")))
+    assert len(proofs.contradictions) == 1
