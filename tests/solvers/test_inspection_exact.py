@@ -221,9 +221,10 @@ def test_a_deadline_gives_a_checked_plan_with_a_bound_and_beats_the_simple_rule(
 def test_no_time_at_all_still_gives_a_feasible_plan() -> None:
     instance = larger(2)
     plan = solve_inspection(instance, SolveOptions(time_limit_s=0.0, threads=1, explain=False))
-    assert plan.claim.status == "feasible"
-    assert plan.claim.limit == "time"
+    assert plan.claim.status in ("feasible", "optimal")  # a fast machine may prove it before the clock is looked at
+    assert plan.claim.status == "optimal" or plan.claim.limit == "time"
     assert len(plan.routes) == 3
+    assert check_inspection(instance, plan).ok
 
 
 def test_a_work_limit_gives_the_same_plan_every_time() -> None:
