@@ -69,15 +69,11 @@ class Campaign:
     def full_map(self, robots: int, share: float, blocking: bool = True) -> float | None:
         """Return the time of the best full-map plan found, as driven, s.
 
-        A plan for fewer robots, or one that sees more, is a plan for this too.
+        A plan that sees more is a plan for this too. One for fewer robots is not: where robots block each other, those
+        that it leaves at their starts may stand in its way.
         """
-        keys = [
-            f"{FULL_MAP} x{n}{'' if blocking or n < 3 else ' no blocking'} {other:.0%}"
-            for n in self.teams
-            if n == robots
-            for other in LIMIT_SHARES
-            if other >= share
-        ]
+        team = f"{FULL_MAP} x{robots}{'' if blocking or robots < 3 else ' no blocking'}"
+        keys = [f"{team} {other:.0%}" for other in LIMIT_SHARES if other >= share]
         times = [self._results[key]["time_s"] for key in keys if key in self._results]
         return min((time for time in times if time is not None), default=None)
 
