@@ -127,7 +127,8 @@ def _solving(entry: Entry, name: str, suite: Suite, settings: Settings) -> Job:
         "axis": entry.axis,
     }  # fmt: skip
     key = json.dumps({**arguments, "memory_mb": memory_mb}, sort_keys=True)
-    return Job(f"solve {key}", "benchmarks.trial:run", arguments, 1.1 * limit_s + GRACE_S, memory_mb)
+    until_s = 1.1 * limit_s + GRACE_S
+    return Job(f"solve {key}", "benchmarks.trial:run", arguments, until_s, memory_mb, settings.threads or suite.threads)
 
 
 def prepare(jobs: Sequence[Job]) -> Record | None:

@@ -44,6 +44,8 @@ class Job:
         The process is killed after so many seconds of wall time, its start included; None for never.
     memory_limit_mb
         It is killed when it and its children hold more resident memory, MB (10^6 bytes); None for never.
+    cores
+        Cores that it keeps busy: what a Ray cluster sets aside for it. On this machine ``workers`` decides.
     """
 
     key: str
@@ -51,6 +53,7 @@ class Job:
     arguments: Mapping[str, Any] = field(default_factory=dict)
     time_limit_s: float | None = None
     memory_limit_mb: float | None = None
+    cores: int = 1
 
 
 @dataclass(frozen=True)
@@ -117,10 +120,11 @@ def run_jobs(
         alone, more saves loading libraries. A process that was killed or died is never used again.
     retries
         Further attempts at a job whose process died by itself. A job that raised, or was killed at a limit, would
-        do so again and is not repeated.
+        do so again and is not repeated. One that a cluster lost with its machine is tried at least once more.
     cluster
         None for this machine; else the address of a Ray cluster (``auto`` for the one there is, ``local`` to start
-        one here with ``workers`` places), whose machines must have the same packages installed.
+        one here for ``workers`` jobs at a time), whose machines must have the same packages installed and find the
+        files that arguments name under the same paths. ``reuse`` is 1 there.
     header
         Written as a line of its own before the first new record, with the time in ``begun``. Where it has a ``kind``,
         a file that begins with another one is refused.
@@ -132,11 +136,13 @@ def run_jobs(
     Raises
     ------
     UsageError
-        Where keys repeat, or another process works on the file.
+        Where keys repeat, another process works on the file, or no machine of a cluster has a job's cores.
     InputError
         Where the file cannot be read or written, or holds something else.
     MissingPartError
         Where a cluster is asked for and Ray is not installed.
+    ReactError
+        Where the cluster cannot be reached, or its machines cannot run the jobs.
     """
     keys = [job.key for job in jobs]
     if len(set(keys)) < len(keys):

@@ -40,6 +40,15 @@ def die_once(mark: str) -> str:
     return "alive"
 
 
+def kill_minder_once(mark: str) -> str:
+    """Kill the process that minds this one at the first call; this one ends as its line is cut."""
+    if not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getppid(), signal.SIGKILL)
+        time.sleep(600)
+    return "alive"
+
+
 def die() -> None:
     print("a last word", flush=True)
     os._exit(7)

@@ -8,12 +8,12 @@ import signal
 import subprocess
 import sys
 import time
-from importlib import util
 from pathlib import Path
 
 import pytest
+from extras import need
 
-from react_opt.errors import InputError, MissingPartError, UsageError
+from react_opt.errors import InputError, MissingPartError, ReactError, UsageError
 from react_opt.jobs import Job, Record, run_jobs
 from react_opt.jobs_file import opened, read_lines
 
@@ -124,18 +124,32 @@ def test_faults_are_named(tmp_path: Path) -> None:
         run_jobs([job], tmp_path / "no" / "r.jsonl")
 
 
-@pytest.mark.skipif(util.find_spec("ray") is not None, reason="ray is installed")
-def test_without_ray_the_extra_is_named(tmp_path: Path) -> None:
+def test_without_ray_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("react_opt.jobs_ray.util.find_spec", lambda name: None)
     with pytest.raises(MissingPartError, match=r"react_opt\[ray\]"):
         run_jobs([Job("a", f"{HERE}:double", {"number": 1})], tmp_path / "r.jsonl", cluster="local")
 
 
-@pytest.mark.skipif(util.find_spec("ray") is None, reason="ray is not installed: the cluster backend is not tested")
-def test_jobs_run_on_a_local_ray_cluster_and_finished_ones_are_skipped(tmp_path: Path) -> None:
+@pytest.mark.extras
+def test_jobs_run_on_a_local_ray_cluster(tmp_path: Path) -> None:
+    """Finished ones are skipped; whose own process dies has died, whose Ray worker is killed is tried again."""
+    need("ray", "ray")
     file, log = tmp_path / "r.jsonl", tmp_path / "log"
     jobs = [Job(f"n{k}", f"{HERE}:note", {"log": str(log), "number": k}) for k in range(3)]
     run_jobs(jobs[:1], file)
     dying = Job("d", f"{HERE}:die")
-    records = run_jobs([*jobs, dying], file, workers=2, cluster="local", retries=0)
-    assert [record.ending for record in records] == ["done"] * 3 + ["died"]
+    orphan = Job("o", f"{HERE}:kill_minder_once", {"mark": str(tmp_path / "mark")}, time_limit_s=60)
+    wide = Job("w", f"{HERE}:double", {"number": 1}, cores=2)
+    records = run_jobs([*jobs, dying, orphan, wide], file, workers=2, cluster="local", retries=0)
+    assert [record.ending for record in records] == ["done"] * 3 + ["died", "done", "done"]
+    assert "code 7: a last word" in records[3].error
     assert sorted(log.read_text().split()) == ["0", "1", "2"]
+    assert [line["key"] for line in read_lines(file)].count("o") == 1
+
+
+@pytest.mark.extras
+@pytest.mark.parametrize("address", ["nonsense", "127.0.0.1:9", "ray://127.0.0.1:9"])
+def test_a_cluster_that_cannot_be_reached_is_one_line(tmp_path: Path, address: str) -> None:
+    need("ray", "ray")
+    with pytest.raises(ReactError, match=rf"the Ray cluster '{address}' cannot be reached: [^\n]+$"):
+        run_jobs([Job("a", f"{HERE}:double", {"number": 1})], tmp_path / "r.jsonl", cluster=address)

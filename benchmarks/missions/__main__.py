@@ -4,7 +4,8 @@
     python -m benchmarks.missions mission.json --map other.yaml    starts and robots of a mission or fleet, on any map
 
 Missions run in processes of their own and are appended to the results file one by one; called again with the same
-file, the campaign goes on where it was stopped. Without ``--seeds`` missions are as in the issue: ten seeds.
+file, the campaign goes on where it was stopped. With ``--ray`` they spread over a Ray cluster (the ``ray`` extra),
+whose machines find the map and the folder of ``--traces`` under the same paths. Without ``--seeds`` there are ten.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     print(f"{record.key}: {record.ending}: {record.error}", file=sys.stderr)
 
             records = run_jobs(
-                jobs, file, workers=options.workers, reuse=50, cluster=options.cluster, header=header,
+                jobs, file, workers=options.workers, reuse=50, cluster=options.ray, header=header,
                 on_record=tell, should_stop=interruption.asked,
             )  # fmt: skip
     except ReactError as error:
@@ -110,7 +111,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--restarts", type=int, default=6, help="searches per full-map plan")
     parser.add_argument("--horizon-s", type=float, help="instead of the mission's")
     parser.add_argument("--workers", type=int, default=1, help="missions at a time")
-    parser.add_argument("--cluster", help="Ray cluster: auto, local or an address")
+    parser.add_argument("--ray", help="Ray cluster: local, auto or an address.")
     parser.add_argument("--time-limit-s", type=float, default=600.0, help="wall time after which a mission is given up")
     parser.add_argument("-o", "--output", help="results, JSON lines; by default missions_MAP.jsonl")
     parser.add_argument("--traces", help="folder to keep traces in")
