@@ -82,8 +82,6 @@ def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float
     kind = certificate.get("kind")
     if kind not in ("lagrangian", "tree"):
         raise UsageError("the certificate is of an unknown kind; expected 'lagrangian' or 'tree'")
-    if instance.chargers:
-        raise UsageError("bounds of instances with chargers cannot be recomputed")
     shape = (len(instance.robots), len(instance.cells))
     whole = _Part(
         np.zeros(shape, dtype=np.int64),
@@ -145,6 +143,8 @@ def _bound_of_choice(instance: OrosInstance, leaf: Mapping[str, Any], prices: Pr
     limits = instance.limits
     if limits.forbid_swaps or limits.robots_per_cell is not None or limits.sensing_robots_per_step is not None:
         raise UsageError("the certificate enumerates routes, which limits between robots do not allow")
+    if instance.chargers:
+        raise UsageError("the certificate enumerates routes, which chargers do not allow")
     classes, floor = _classes(instance, leaf, part), float(leaf["bound"])
     best = [float(group["best"]) for group, *_ in classes]
     counts = [len(group["robots"]) for group, *_ in classes]
@@ -167,19 +167,22 @@ def _rounded(instance: OrosInstance, bound: float) -> float:
     """Return the largest value not above a bound that a plan can have, where weights and energies are whole.
 
     Coverage is then a multiple of the weights' common divisor, and the battery at the end lies a multiple of the
-    energies' common divisor below that at the start.
+    energies' common divisor below that at the start; with chargers, which are best used for what power and capacity
+    allow, below the capacities.
     """
     bound += 1e-10 * abs(bound)
     weights = [cell.weight for cell in instance.cells if cell.weight > 0 and not cell.explored]
     energies = [arc.energy_j for arc in instance.travel]
+    energies += [charger.power_w * instance.step_s for charger in instance.chargers]
     for robot in instance.robots:
         energies += [robot.idle_w * instance.step_s, robot.sensing_w * instance.step_s]
+        energies += [robot.capacity_j - robot.battery_j] if instance.chargers else []
     if any(x != int(x) or x > 2**52 for x in weights):
         return bound
     unit = math.gcd(*(int(w) for w in weights)) if weights else 1
     whole = all(x == int(x) and x <= 2**52 for x in energies)
     quantum = math.gcd(*(int(q) for q in energies)) if whole else 0
-    most = sum(robot.battery_j for robot in instance.robots)
+    most = sum(robot.capacity_j if instance.chargers else robot.battery_j for robot in instance.robots)
     least = sum(robot.reserve_j for robot in instance.robots)
     if instance.sigma == 0:
         return float(unit * math.floor(bound / unit))
@@ -224,17 +227,22 @@ def _read(instance: OrosInstance, certificate: Mapping[str, Any], memory: list[l
         raise UsageError("the certificate has more than 64 cuts")
     stand: dict[tuple[int, int], float] = {}
     sense: dict[int, float] = {}
+    slot: dict[tuple[int, int], float] = {}
+    slots = {charger.cell: charger.slots for charger in instance.chargers}
     worth = 0.0
     for row in certificate["rows"]:
         price = max(0.0, float(row["price"]))
-        limit = getattr(instance.limits, row["rule"])
+        charges = row["rule"] == "charging_slots"
+        limit = slots.get(instance.cells[int(row["cell"])].id) if charges else getattr(instance.limits, row["rule"])
         if limit is None:
             raise UsageError(f"the certificate uses the limit {row['rule']}, which the instance does not have")
         worth += price * limit
         t = int(row["t"])
         if t < 1:
             raise UsageError("the certificate limits standing or sensing at t = 0, which nothing does")
-        if row["rule"] == "robots_per_cell":
+        if charges:
+            slot[t, int(row["cell"])] = slot.get((t, int(row["cell"])), 0.0) + price
+        elif row["rule"] == "robots_per_cell":
             stand[t, int(row["cell"])] = stand.get((t, int(row["cell"])), 0.0) + price
         else:
             sense[t] = sense.get(t, 0.0) + price
@@ -246,5 +254,6 @@ def _read(instance: OrosInstance, certificate: Mapping[str, Any], memory: list[l
         [max(0.0, float(cut["price"])) for cut in certificate["cuts"]],
         stand,
         sense,
+        slot,
         worth,
     )

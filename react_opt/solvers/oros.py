@@ -21,7 +21,6 @@ from react_opt.solvers.oros_search import Search, proven
 from react_opt.solvers.outcome import Request
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.greedy import InfeasibleRobot, greedy
-from react_opt.solvers.routes.result import unpriced
 from react_opt.solvers.routes.search import improve
 from react_opt.timegraph import route_problem
 
@@ -118,20 +117,15 @@ def _greedy(search: Search) -> None:
 def _choose(search: Search) -> Any:
     """Return the method that fits, and note why where the choice was forced."""
     options = search.options
-    unpriced_because = unpriced(search.problem)
     if options.method == "routes":
         if options.solver not in (None, "highs"):
             raise UsageError(f"solver: the method routes works with highs, not with {options.solver!r}")
-        if unpriced_because is not None:
-            raise UsageError(f"method: {unpriced_because}; expected auto or monolith")
         search.method = "routes: asked for"
         return _routes
     if options.method == "monolith":
         search.method = "monolith: asked for"
     elif options.solver is not None:
         search.method = f"monolith: the solver {options.solver} was asked for"
-    elif unpriced_because is not None:
-        search.method = f"monolith: {unpriced_because}"
     else:
         search.method = "routes"
         return _routes_then_monolith

@@ -32,7 +32,8 @@ class Lattice:
     """The values that plans can have, if all data are whole numbers.
 
     A plan is worth ``g a + sigma (B - q b)`` with whole a and b: g divides every reward, q every energy, B is
-    the sum of the batteries. A bound that lies between two such values is worth the lower one.
+    the sum of the batteries (of the capacities, where there are chargers). A bound that lies between two such values
+    is worth the lower one.
 
     Parameters
     ----------
@@ -46,13 +47,13 @@ class Lattice:
         self.reward_unit = _unit(positive) if len(positive) else 1.0
         energies = [problem.arc_energy_j]
         energies += [np.array([group.wait_j, group.sense_j]) for group in problem.classes]
-        self.energy_unit = _unit(np.concatenate(energies))
-        if problem.charger_j.any():
-            self.energy_unit = 0.0
         self.battery_j = sum(len(group.robots) * group.battery_j for group in problem.classes)
         self.least_j = sum(len(group.robots) * group.reserve_j for group in problem.classes)
-        if problem.charger_j.any():
+        if problem.charger_j.any():  # it is best to charge what power and capacity allow
             self.battery_j = sum(len(group.robots) * group.capacity_j for group in problem.classes)
+            energies.append(problem.charger_j)
+            energies.append(np.array([group.capacity_j - group.battery_j for group in problem.classes]))
+        self.energy_unit = _unit(np.concatenate(energies))
 
     def round_down(self, bound: float) -> float:
         """Return the largest value a plan can have that is not above ``bound``, or ``bound`` if unknown.

@@ -9,7 +9,7 @@ from react_opt.route_problem import RouteProblem
 from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.generation import Multipliers
 from react_opt.solvers.routes.memory import Memory
-from react_opt.solvers.routes.rows import SenseRow, StandRow
+from react_opt.solvers.routes.rows import ChargeRow, SenseRow, StandRow
 from react_opt.solvers.routes.tree import Part
 
 
@@ -105,6 +105,8 @@ def _prices(
             place = {"rule": "robots_per_cell", "cell": row.cell, "t": problem.horizon - row.from_end}
         elif isinstance(row, SenseRow):
             place = {"rule": "sensing_robots_per_step", "t": problem.horizon - row.from_end}
+        elif isinstance(row, ChargeRow):
+            place = {"rule": "charging_slots", "cell": row.cell, "t": problem.horizon - row.from_end}
         else:
             continue
         priced_rows.append({**place, "price": float(price)})

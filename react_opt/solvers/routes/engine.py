@@ -20,7 +20,7 @@ from react_opt.solvers.routes.greedy import greedy
 from react_opt.solvers.routes.master import Master
 from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pricing import RoutePricer
-from react_opt.solvers.routes.result import RoutesResult, Status, unpriced
+from react_opt.solvers.routes.result import RoutesResult, Status
 from react_opt.solvers.routes.routecolumn import route_column
 from react_opt.solvers.routes.search import improve
 from react_opt.solvers.routes.tightening import Tightening
@@ -70,9 +70,6 @@ def solve_routes(
     should_stop
         Polled; True stops as an interrupt.
     """
-    reason = unpriced(problem)
-    if reason is not None:
-        return RoutesResult(None, None, None, "not_priced", "none", notes=(reason,))
     budget = Budget(deadline, work_limit, should_stop)
     standing = Standing(problem, budget, gap, on_progress)
     if start is not None:

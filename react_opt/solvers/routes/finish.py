@@ -31,10 +31,10 @@ class Finish:
     def __init__(self, generation: Generation, standing: Standing) -> None:
         self.generation, self.standing = generation, standing
         problem = generation.pricer.problem
-        # with limits between robots a worse route with the same cells can be of use
+        # with limits between robots a worse route with the same cells can be of use; chargers are not enumerated
         self._coupled = (
             problem.forbid_swaps or problem.robots_per_cell is not None or problem.sensing_robots_per_step is not None
-        )
+        ) or bool(problem.charger_j.any())
         self.routes = 0  # enumerated in the attempts that succeeded
         self._hopeless_gap = np.inf
 

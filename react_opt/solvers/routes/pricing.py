@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,9 @@ from react_opt.solvers.routes.columns import Column, Duals, Priced, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.labels import flat_values, grow_labels, trace
 from react_opt.solvers.routes.labelstore import NEVER, Fuel, Graph, Labels, Prices, no_labels
+from react_opt.solvers.routes.linesearch import lowest_point
 from react_opt.solvers.routes.memory import Memory
+from react_opt.solvers.routes.recharge import recharging
 from react_opt.solvers.routes.region import Region
 from react_opt.solvers.routes.routecolumn import route_column
 
@@ -25,7 +27,7 @@ BACKWARD_LABELS = 100_000
 
 @dataclass(frozen=True)
 class SidePrices:
-    """Prices of standing in a cell at an instant and of sensing at an instant, and the region that branching looks at.
+    """Prices of standing, charging and sensing at an instant, and the region that branching looks at.
 
     Parameters
     ----------
@@ -33,12 +35,15 @@ class SidePrices:
         ``(T + 1, n)`` price of standing, infinite where it is forbidden; None if there is none.
     sense
         ``(T + 1,)`` price of sensing; None if there is none.
+    charge
+        ``(T + 1, n)`` price of charging; None if there is none.
     region
         When each class may collect each cell; None if always.
     """
 
     stand: FloatArray | None = None
     sense: FloatArray | None = None
+    charge: FloatArray | None = None
     region: Region | None = None
 
 
@@ -73,6 +78,7 @@ class RoutePricer:
         self._finish = []
         self._rate = [0.0] * len(problem.classes)
         self._fuel: list[tuple[Fuel, Fuel]] = []
+        self._charging = recharging(problem)
         no_gain = np.zeros((horizon + 1, n))
         for group in problem.classes:
             origin = np.full(n, NEVER)
@@ -125,7 +131,7 @@ class RoutePricer:
 
     def binds(self, group: int) -> bool:
         """Return whether the battery of a class can bind, so that labels carry it."""
-        return bool(np.isfinite(self._fuel[group][0].budget))
+        return group in self._charging or bool(np.isfinite(self._fuel[group][0].budget))
 
     def prices(self, group: int, duals: Duals, side: SidePrices, cuts: Sequence[Rank1Cut]) -> tuple[Prices, Prices]:
         """Return the prices of one class in both directions of time."""
@@ -138,7 +144,8 @@ class RoutePricer:
             instant = np.arange(problem.horizon + 1)[:, None]
             gain = np.where((instant < first) | (instant > last), NEVER, gain)
         gain[: max(1, data.start_step)] = NEVER
-        gain[problem.sigma * data.sense_j >= problem.reward.T] = NEVER
+        costs = 0.0 if group in self._charging else problem.sigma * data.sense_j  # a charger may give it back
+        gain[costs >= problem.reward.T] = NEVER
         stand = self._no_stand if side.stand is None else side.stand
         arc_cost, wait_cost = problem.sigma * problem.arc_energy_j, problem.sigma * data.wait_j
         priced = tuple(duals.cut)
@@ -188,22 +195,28 @@ class RoutePricer:
         for group in range(len(self.problem.classes)) if groups is None else groups:
             ahead, back = self.prices(group, duals, side, cuts)
             data = self.problem.classes[group]
-            fuel, bound = self._rest(group, back, onwards=True)
             cutoff = float(floor[group]) - self._constant(group)
-            labels, complete = grow_labels(
-                self.forward,
-                ahead,
-                fuel,
-                self._origin[group],
-                data.start_step,
-                bound,
-                self._no_labels,
-                cutoff,
-                MAX_LABELS if width is None else width,
-                max_labels,
-                True,
-                self.stop,
-            )
+            most = MAX_LABELS if width is None else width
+            if group in self._charging:
+                labels, complete = self._charging[group].grow(
+                    self.forward, ahead, side.charge, self._origin[group], cutoff, most, max_labels, self.stop
+                )
+            else:
+                fuel, bound = self._rest(group, back, onwards=True)
+                labels, complete = grow_labels(
+                    self.forward,
+                    ahead,
+                    fuel,
+                    self._origin[group],
+                    data.start_step,
+                    bound,
+                    self._no_labels,
+                    cutoff,
+                    most,
+                    max_labels,
+                    True,
+                    self.stop,
+                )
             if width is None:
                 self.labels += len(labels.value)
                 self.calls += 1
@@ -262,7 +275,7 @@ class RoutePricer:
     @property
     def joule_prices(self) -> list[float]:
         """Price of a joule for each class, from the last call; 0 where the battery cannot bind."""
-        return list(self._rate)
+        return [self._charging[k].rate if k in self._charging else rate for k, rate in enumerate(self._rate)]
 
     def _rest(self, group: int, prices: Prices, *, onwards: bool) -> tuple[Fuel, FloatArray]:
         """Return the battery with the prices of a joule, and the bound on the rest of a route at each of them.
@@ -298,7 +311,7 @@ class RoutePricer:
             return float(top) + rate * fuel.budget
 
         origin_end = np.flatnonzero(self._finish[group] > NEVER)
-        best = _lowest_point(worth, self._rate[group], float(prices.gain.max(initial=0.0)) / max(data.sense_j, 1.0))
+        best = lowest_point(worth, self._rate[group], float(prices.gain.max(initial=0.0)) / max(data.sense_j, 1.0))
         self._rate[group] = best
         rates = np.array([0.0, 0.4 * best, 0.75 * best, best, 1.3 * best, 2.0 * best]) if best > 0 else np.zeros(1)
         return fuel._replace(rate=rates), np.stack([at_rate(float(rate)) for rate in rates])
@@ -307,16 +320,9 @@ class RoutePricer:
         """Return the route of a label that stands in ``cell`` at the horizon."""
         problem, data = self.problem, self.problem.classes[group]
         cells, arcs, senses = trace(labels, problem.arc_from, problem.arc_steps, label, cell, problem.horizon)
-        return route_column(
-            problem,
-            Route(
-                group,
-                cells[data.start_step :],
-                arcs[data.start_step :],
-                senses[data.start_step :],
-                np.zeros(problem.horizon + 1 - data.start_step),
-            ),
-        )
+        begin, charging = data.start_step, self._charging.get(group)
+        charge_j = np.zeros(len(cells) - begin) if charging is None else charging.credits(labels, label)
+        return route_column(problem, Route(group, cells[begin:], arcs[begin:], senses[begin:], charge_j))
 
     def allowed_end(self, group: int, labels: Labels) -> NDArray[np.bool_]:
         """Return for each label at the horizon whether the class may end there."""
@@ -374,24 +380,3 @@ class RoutePricer:
             cut_keep,
             price,
         )
-
-
-def _lowest_point(function: Callable[[float], float], guess: float, top: float) -> float:
-    """Return roughly where a convex function of a number between 0 and ``top`` is least.
-
-    Around a guess that is already good few evaluations suffice.
-    """
-    low, high = 0.0, top
-    if guess > 0.0:
-        low, high = 0.7 * guess, 1.4 * guess
-        at_low, at_guess, at_high = function(low), function(guess), function(high)
-        if at_low >= at_guess <= at_high:
-            return guess
-        low, high = (guess, top) if at_high < at_guess else (0.0, guess)
-    for _ in range(12):
-        left, right = low + 0.4 * (high - low), low + 0.6 * (high - low)
-        if function(left) <= function(right):
-            high = right
-        else:
-            low = left
-    return 0.5 * (low + high)

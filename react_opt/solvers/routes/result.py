@@ -1,14 +1,14 @@
-"""What the decomposition answers, and which problems it cannot price."""
+"""What the decomposition answers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from react_opt.route_problem import Route, RouteProblem
+from react_opt.route_problem import Route
 from react_opt.solvers.routes.budget import Limit
 
-Status = Literal["optimal", "feasible", "infeasible", "no_plan", "not_priced"]
+Status = Literal["optimal", "feasible", "infeasible", "no_plan"]
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,7 @@ class RoutesResult:
     objective, bound
         Value of the plan and proven bound on every plan; None where unknown.
     status
-        ``optimal``, ``feasible``, ``infeasible`` (proven), ``no_plan``, or ``not_priced``: the instance has an
-        option that the decomposition cannot price.
+        ``optimal``, ``feasible``, ``infeasible`` (proven) or ``no_plan``.
     limit
         What stopped it.
     certificate
@@ -42,16 +41,3 @@ class RoutesResult:
     certificate: dict[str, Any] = field(default_factory=dict)
     iterations: int = 0
     notes: tuple[str, ...] = ()
-
-
-def unpriced(problem: RouteProblem) -> str | None:
-    """Return why the decomposition cannot price a problem, None if it can.
-
-    Parameters
-    ----------
-    problem
-        The route problem.
-    """
-    if problem.charger_j.any():
-        return "chargers are not priced by the route decomposition"
-    return None

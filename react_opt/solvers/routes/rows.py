@@ -56,8 +56,24 @@ class SenseRow:
         return float(position >= 0 and bool(senses[position]))
 
 
+@dataclass(frozen=True)
+class ChargeRow:
+    """At most ``rhs`` robots charge in a cell ``from_end`` instants before the horizon."""
+
+    cell: int
+    from_end: int
+    rhs: float
+
+    def coefficient(self, column: Column) -> float:
+        """Return 1 if the column's route charges there then."""
+        path = column.path
+        position = len(path.cell) - 1 - self.from_end
+        charges = position >= 0 and path.charge_j[position] > 0.0 and path.cell[position] == self.cell
+        return float(charges)
+
+
 def side_prices(base: SidePrices, rows: Sequence[Rank1Cut], price: FloatArray, problem: RouteProblem) -> SidePrices:
-    """Return prices of standing and sensing: what branching forbids, and the prices of all rows.
+    """Return prices of standing, sensing and charging: what branching forbids, and the prices of all rows.
 
     Parameters
     ----------
@@ -68,7 +84,7 @@ def side_prices(base: SidePrices, rows: Sequence[Rank1Cut], price: FloatArray, p
     problem
         The route problem.
     """
-    stand, sense = base.stand, base.sense
+    stand, sense, charge = base.stand, base.sense, base.charge
     for row, worth in zip(rows, price, strict=True):
         if worth == 0.0:
             continue
@@ -83,10 +99,18 @@ def side_prices(base: SidePrices, rows: Sequence[Rank1Cut], price: FloatArray, p
                 sense = np.zeros(problem.horizon + 1) if base.sense is None else base.sense.copy()
             assert sense is not None
             sense[problem.horizon - row.from_end] += worth
-    return replace(base, stand=stand, sense=sense)
+        elif isinstance(row, ChargeRow):
+            if charge is base.charge:
+                empty = np.zeros((problem.horizon + 1, problem.n_cells))
+                charge = empty if base.charge is None else base.charge.copy()
+            assert charge is not None
+            charge[problem.horizon - row.from_end, row.cell] += worth
+    return replace(base, stand=stand, sense=sense, charge=charge)
 
 
-def violated_limits(problem: RouteProblem, columns: Sequence[Column], use: FloatArray) -> list[StandRow | SenseRow]:
+def violated_limits(
+    problem: RouteProblem, columns: Sequence[Column], use: FloatArray
+) -> list[StandRow | SenseRow | ChargeRow]:
     """Return the limits between robots that a solution of the master breaks.
 
     Parameters
@@ -96,7 +120,7 @@ def violated_limits(problem: RouteProblem, columns: Sequence[Column], use: Float
     columns, use
         The master's columns and how much each is used.
     """
-    rows: list[StandRow | SenseRow] = []
+    rows: list[StandRow | SenseRow | ChargeRow] = []
     used = np.flatnonzero(use > 1e-9)
     if problem.robots_per_cell is not None:
         standing = np.zeros((problem.horizon + 1, problem.n_cells))
@@ -114,4 +138,13 @@ def violated_limits(problem: RouteProblem, columns: Sequence[Column], use: Float
             sensing[problem.horizon + 1 - len(senses) :] += use[k] * senses
         for instant in np.flatnonzero(sensing > problem.sensing_robots_per_step + VIOLATION):
             rows.append(SenseRow(problem.horizon - int(instant), float(problem.sensing_robots_per_step)))
+    if problem.charger_j.any():
+        charging = np.zeros((problem.horizon + 1, problem.n_cells))
+        for k in used.tolist():
+            path = columns[k].path
+            at = np.flatnonzero(path.charge_j > 0.0)
+            np.add.at(charging, (at + problem.horizon + 1 - len(path.cell), path.cell[at]), use[k])
+        for instant, cell in np.argwhere(charging > problem.charger_slots[None, :] + VIOLATION):
+            slots = float(problem.charger_slots[cell])
+            rows.append(ChargeRow(int(cell), problem.horizon - int(instant), slots))
     return rows
