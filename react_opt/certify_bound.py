@@ -90,7 +90,7 @@ def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float
     )
     memory = _memory(instance, certificate)
     if kind == "lagrangian":
-        return _rounded(instance, _bound_of(instance, certificate, memory, whole))
+        return _explored_value(instance) + _rounded(instance, _bound_of(instance, certificate, memory, whole))
     worst, waiting = -math.inf, [(certificate["tree"], whole, 0)]
     while waiting:
         node, part, depth = waiting.pop()
@@ -100,7 +100,17 @@ def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float
         if depth == DEEPEST or not 0 <= int(node["cell"]) < shape[1]:
             raise UsageError("the certificate's tree is too deep or asks about a cell that the instance does not have")
         waiting += [(node[side], part.side(node, side == "yes"), depth + 1) for side in ("yes", "no")]
-    return _rounded(instance, worst)
+    return _explored_value(instance) + _rounded(instance, worst)
+
+
+def _explored_value(instance: OrosInstance) -> float:
+    """Return what cells that are explored from the start earn, in every plan; certificates leave it out."""
+    last = instance.horizon_steps
+    return sum(
+        cell.weight * min(last, last if cell.deadline_step is None else cell.deadline_step)
+        for cell in instance.cells
+        if cell.explored
+    )
 
 
 def _bound_of(instance: OrosInstance, leaf: Mapping[str, Any], memory: list[list[int]], part: _Part) -> float:

@@ -89,14 +89,16 @@ def _announced() -> Iterator[None]:
 
 
 def _oros() -> Iterator[Document]:
-    """A ring of cells with a chord: batteries that bind and that do not, with and without limits between robots."""
+    """A ring of cells with a chord: batteries that bind or not, chargers, limits between robots."""
     n, horizon = 8, 10
     travel = [
         {"from": f"c{i}", "to": f"c{j % n}", "steps": d, "energy_j": 3.0 * d}
         for i in range(n)
         for j, d in ((i + 1, 1), (i - 1, 1), (i + 3, 2))
     ]
-    for battery_j, limits in ((1000.0, {}), (60.0, {}), (1000.0, {"robots_per_cell": 1, "forbid_swaps": True})):
+    chargers = {"chargers": [{"cell": "c2", "power_w": 9.0}]}
+    coupled = {"limits": {"robots_per_cell": 1, "forbid_swaps": True}}
+    for battery_j, more in ((1000.0, {}), (60.0, {}), (60.0, chargers), (1000.0, coupled)):
         robots = [
             {"id": f"r{k}", "start": f"c{k}", "battery_j": battery_j, "capacity_j": battery_j, "idle_w": 1.0,
              "sensing_w": 5.0, "start_step": k}
@@ -106,7 +108,7 @@ def _oros() -> Iterator[Document]:
             {
                 "name": "warm-up", "horizon_steps": horizon, "step_s": 1.0, "travel": travel, "robots": robots,
                 "cells": [{"id": f"c{i}", "x_m": 0.0, "y_m": 0.0, "weight": 1.0 + i % 3} for i in range(n)],
-                "limits": limits,
+                **more,
             }
         )  # fmt: skip
 

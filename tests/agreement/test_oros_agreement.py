@@ -20,7 +20,7 @@ from react_opt.solvers.registry import names
 
 SEEDS = range(200)
 WAYS = ["auto", "routes", *names()]
-REFUSALS = {"cp-sat", "routes"}  # CP-SAT computes in whole numbers; the decomposition does not price every option
+REFUSALS = {"cp-sat"}  # it computes in whole numbers
 
 
 @cache

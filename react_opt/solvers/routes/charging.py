@@ -257,8 +257,9 @@ def grow_charging(
                         continue
                     best = np.inf
                     for r in range(len(rate)):
-                        room_j = (charge.budget if rate[r] >= 0.0 else charge.floor) - (f - amount)
-                        best = min(best, v + hoped + completion[r, tau, j] + rate[r] * room_j)
+                        room_j = (charge.budget if rate[r] >= 0.0 else charge.floor) - f
+                        now = max(0.0, (charge.sigma + rate[r]) * amount - toll)
+                        best = min(best, v + now + completion[r, tau, j] + rate[r] * room_j)
                     if best < cutoff:
                         continue
                     if found + 4 > room:

@@ -164,7 +164,7 @@ class _Proof:
         tree = Tree(self.generation, self.tightening, self.finish, self.standing, self.generation.best)
         tree.run()
         proof = tree_certificate(self.problem, self.memory, tree.root, self.pricer.joule_prices)
-        if tree.root.split is not None and proof["bound"] < self.proof["bound"]:
+        if proof["bound"] < self.proof["bound"]:
             self.proof = proof
         self.notes += tree.notes()
 
