@@ -96,6 +96,21 @@ def test_a_repairman_problem_with_profits(tmp_path: Path) -> None:
     assert solved(instance).objective.coverage == best
 
 
+@pytest.mark.parametrize(
+    ("repairmen", "best"), [(1, 6 * 20 - (1 + 2 + 3 + 7 + 8 + 9)), (2, 6 * 20 - 2 * (1 + 2 + 3)), (6, 108)]
+)
+def test_repairmen_on_a_line_are_proven(tmp_path: Path, capsys: Any, repairmen: int, best: int) -> None:
+    """Customers 1, 2 and 3 to either side of the depot. Two repairmen take a side each and arrive as early as anybody
+    can, so more do not help; one goes to one end first: to turn earlier delays more customers than it serves sooner."""
+    nodes = "".join(f"{x} 0 {20 if x else 0}\n" for x in (0, 1, -1, 2, -2, 3, -3))
+    file = written(tmp_path, "line.txt", f"7 {repairmen}\n{nodes}")
+    assert convert(["mrpp", file, "-o", str(tmp_path / "made")]) == 0
+    instance = load(capsys.readouterr().out.strip())
+    plan = solve(instance, method="routes", threads=1)
+    assert (plan.claim.status, plan.claim.objective) == ("optimal", best)
+    assert check(instance, plan, bound=True).ok or plan.claim.certificate is None
+
+
 def test_a_team_orienteering_file(tmp_path: Path) -> None:
     """Two routes from the first point to the last within T: all ordered pairs of disjoint subsets of four points."""
     points = [(0, 0, 0), (1, 2, 5), (3, 1, 8), (-2, 1, 6), (2, -3, 9), (4, 0, 0)]
