@@ -192,7 +192,7 @@ def _segment_move(
 ) -> bool:
     """Make a random cell follow one near it by one of the moves, unless it looks worse than ``bar``."""
     b = int(draw(random) * len(s.owner))
-    a = tables.near[b, int(draw(random) * min(tables.near.shape[1], _REACH))]
+    a = tables.near[b, int(draw(random) * draw(random) * min(tables.near.shape[1], _REACH))]
     if a < 0 or s.owner[a] < 0:
         return False
     ra, rb = s.owner[a], s.owner[b]

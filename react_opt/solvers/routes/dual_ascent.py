@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +36,10 @@ SAMPLE = 300  # routes drawn to look for cycles
 ROUNDS = 8  # of growing memory
 BETWEEN = 20  # iterations between two exact pricings
 WORTH_IT = 1e-4  # relative change of the bound below which the memory is not grown once more
+
+
+class _Stopped(Exception):
+    """A limit was reached within a descent."""
 
 
 class DualAscent:
@@ -75,7 +80,9 @@ class DualAscent:
         bits = next((b for b in range(FIRST_BITS, 0, -1) if places << b <= MOST_WEIGHTS), 0)
         if bits == 0:
             return
-        smooth = SmoothedDual(self.problem, Memory(self.memory.steps, bits).near, self.threads)
+        smooth = SmoothedDual(
+            self.problem, Memory(self.memory.steps, bits).near, self.threads, self.generation.pricer.stop
+        )
         reward = self.problem.reward.max(axis=1, initial=0.0)
         scale = float(np.mean(reward[reward > 0.0])) if reward.any() else 1.0
         cell, temperature = self.best.duals.cell, HOT * scale
@@ -90,10 +97,11 @@ class DualAscent:
                 return
             before = self.best.bound
             smooth.value(cell, temperature)
+            if self.standing.done():  # the sums may have been given up
+                return
             routes = [smooth.draw(k, SAMPLE, self.rng) for k in range(len(self.problem.classes))]
             pairs = smooth.grow(_cycles([route for part in routes for route in part]))
-            for pair in pairs:  # one by one: some may find no colour
-                self.memory.grow([pair])
+            self.memory.grow(pairs)
             self.generation.pricer.remember()
             if not pairs:
                 break
@@ -102,6 +110,8 @@ class DualAscent:
             if before - self.best.bound < WORTH_IT * abs(before):
                 break
         smooth.value(cell, temperature)
+        if self.standing.done():
+            return
         drawn = [route for k in range(len(self.problem.classes)) for route in smooth.draw(k, SAMPLE, self.rng)]
         self.master.add([route_column(self.problem, route) for route in drawn if self._possible(route)])
         self.generation.best = self.best
@@ -116,7 +126,10 @@ class DualAscent:
 
         def value(prices: FloatArray) -> tuple[float, FloatArray]:
             self.standing.budget.spend()
-            return smooth.value(prices, temperature)
+            found = smooth.value(prices, temperature)
+            if self.standing.done():
+                raise _Stopped
+            return found
 
         def watch(prices: FloatArray) -> None:
             nonlocal reached, count
@@ -124,18 +137,20 @@ class DualAscent:
             if count % BETWEEN == 0 and count < ITERATIONS:
                 self._evaluate(np.maximum(0.0, reached))
             left_s = self.standing.budget.left_s()
-            late = left_s is not None and left_s < 3.0 * self._pricing_s  # what is reached has to be priced yet
-            if late or self.standing.done():
+            if left_s is not None and left_s < 3.0 * self._pricing_s:  # what is reached has to be priced yet
                 raise StopIteration
 
-        minimize(
-            value, cell, jac=True, method="L-BFGS-B", bounds=[(0.0, None)] * len(cell), callback=watch,
-            options={"maxiter": ITERATIONS, "maxcor": 50, "ftol": PRECISION},
-        )  # fmt: skip
+        with suppress(_Stopped):
+            minimize(
+                value, cell, jac=True, method="L-BFGS-B", bounds=[(0.0, None)] * len(cell), callback=watch,
+                options={"maxiter": ITERATIONS, "maxcor": 50, "ftol": PRECISION},
+            )  # fmt: skip
         return np.maximum(0.0, reached)
 
     def _evaluate(self, cell: FloatArray) -> None:
-        """Take the bound that some prices prove, and the routes found on the way."""
+        """Take the bound that some prices prove, and the routes found on the way, if there is time."""
+        if self.best is not None and self.standing.done():
+            return
         begun = time.perf_counter()
         groups = len(self.master.counts)
         duals = Duals(cell, np.zeros(groups), np.zeros(0), np.zeros(0))

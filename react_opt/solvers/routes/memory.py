@@ -88,18 +88,21 @@ class Memory:
 
         A pair whose colours cannot be accommodated in a word is left out.
         """
-        near = [set(cells) for cells in self.near]
-        added = 0
+        added, full = 0, False
         for place, cell in pairs:
-            if cell not in near[place] and len(near[place]) < WORD_BITS:
-                near[place].add(cell)
-                added += 1
-        if added == 0:
-            return 0
-        colour = self._colours(near)
-        if colour is None:
-            return 0
-        self.near, self.colour = near, colour
+            near = self.near[place]
+            if cell in near or len(near) >= WORD_BITS:
+                continue
+            clash = any(self.colour[other] == self.colour[cell] for other in near)
+            near.add(cell)
+            if clash and not self._recolour(cell):
+                colours = None if full else self._colours(self.near)
+                if colours is None:
+                    full = True  # all cells anew is slow, and would fail again
+                    near.discard(cell)
+                    continue
+                self.colour = colours
+            added += 1
         return added
 
     def allows(self, route: Route) -> bool:
@@ -147,6 +150,15 @@ class Memory:
             for cell in near:
                 cells[place, self.colour[cell]] = cell
         return cells
+
+    def _recolour(self, cell: int) -> bool:
+        """Give one cell a colour that none of those remembered beside it has; return whether there is one."""
+        rivals: set[int] = set().union(*(near for near in self.near if cell in near)) - {cell}
+        taken = {int(self.colour[rival]) for rival in rivals}
+        free = next((k for k in range(WORD_BITS) if k not in taken), None)
+        if free is not None:
+            self.colour[cell] = free
+        return free is not None
 
     def _colours(self, near: list[set[int]]) -> IntArray | None:
         """Return a colour per cell, different wherever two cells are remembered together; None if none fits."""

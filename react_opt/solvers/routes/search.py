@@ -17,8 +17,9 @@ from react_opt.solvers.routes.sequences import SequenceModel, applies, decode, e
 
 _DEFAULT_WORK = 100
 _MOST_CELLS = 6000  # above this the square table of fastest ways is not built
-_HOT, _COLD = 0.1, 0.02  # temperatures as shares of what a cell earns at best, on average
+_HOT, _WARM, _COLD = 0.2, 0.08, 0.015  # temperatures as shares of what a cell earns at best, on average
 _FIRST_CYCLE = 4  # annealing chunks of the first cycle; every cycle is four times as long as the one before
+_REHEATS = 4  # annealings from warm, each half as long as the one from hot before them
 _WIDTHS = (64, 256, 1024)
 _EXPANSIONS = 400_000  # labels times arcs that one best response may look at, some tenths of a second
 
@@ -160,7 +161,10 @@ def _hindered(problem: RouteProblem) -> bool:
 
 
 def _anneal(search: _Search, model: SequenceModel, cycle: int) -> None:
-    """One cycle of annealing from the best plan, hot first and milder in later cycles."""
+    """One cycle of annealing: from hot, where little of the plan is kept, then several times from warm.
+
+    Each of the latter begins with the best sequences of the cycle.
+    """
     problem = search.problem
     ruin_share = min(0.06, max(0.001, 1.5 / problem.n_cells))  # one costs as much as many segment moves
     if any(battery_can_bind(problem, group) for group in problem.classes):
@@ -175,16 +179,20 @@ def _anneal(search: _Search, model: SequenceModel, cycle: int) -> None:
     )  # fmt: skip
     random = np.array([search.rng.integers(1, 1 << 62)], dtype=np.uint64)
     scale = float(np.mean(reward.max(axis=1)[reward.max(axis=1) > 0.0])) if reward.any() else 1.0
-    hot, cold = _HOT * scale, _COLD * scale
-    chunks = _FIRST_CYCLE << min(2 * cycle, 40)
+    chunks = (1 + _REHEATS / 2) * (_FIRST_CYCLE << min(2 * cycle, 40))
     begin, left = search.work, search.left()
     stretched = chunks * search.chunk_share > 0.25 * left  # the last cycle takes all that is left
-    worth = -np.inf
+    worth, phase = -np.inf, 0
     while not search.over():
         share = 1.0 - (search.left() - 0.03) / left if stretched else (search.work - begin) / chunks
         if share >= 1.0:
             break
-        heat = hot * (cold / hot) ** share
+        stage, share = divmod(share * (2 + _REHEATS), 1.0)  # the first two are the annealing from hot
+        if stage >= 2 and stage != phase:
+            order[:], lengths[:] = best_order, best_lengths
+        phase = int(stage)
+        hot = _WARM if stage >= 2 else _HOT
+        heat = scale * hot * (_COLD / hot) ** (share if stage >= 2 else 0.5 * (stage + share))
         search.work += 1
         found = anneal(order, lengths, best_order, best_lengths, worth, heat, moves, ruin_share, random, tables)
         if found > worth and not _hindered(problem):

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 
 import numpy as np
+from numpy.typing import NDArray
 
 from react_opt.route_problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.softkernel import NEVER, SoftGraph, SoftRobot, SoftTables, draw_route, soft_pass
@@ -35,10 +36,19 @@ class SmoothedDual:
         For each cell the cells remembered there, itself included.
     threads
         Robot classes that are summed at once; each thread has tables of its own.
+    stop
+        ``(1,)`` flag; while it is not 0, sums are given up at once and mean nothing.
     """
 
-    def __init__(self, problem: RouteProblem, near: Sequence[Iterable[int]], threads: int = 1) -> None:
+    def __init__(
+        self,
+        problem: RouteProblem,
+        near: Sequence[Iterable[int]],
+        threads: int = 1,
+        stop: NDArray[np.uint8] | None = None,
+    ) -> None:
         self.problem = problem
+        self._stop = np.zeros(1, np.uint8) if stop is None else stop
         self._threads = max(1, min(threads, len(problem.classes)))
         self.near = [[*sorted({*cells} - {j}), j] for j, cells in enumerate(near)]  # the cell itself last
         self._cell, self._temperature = np.zeros(problem.n_cells), 1.0
@@ -137,7 +147,7 @@ class SmoothedDual:
         return SoftRobot(group.start, group.start_step, group.return_to, problem.sigma * group.wait_j, gain)
 
     def _pass(self, robot_class: int, tables: SoftTables) -> tuple[float, FloatArray]:
-        return soft_pass(self._graph, self._robot(robot_class), tables, self._temperature)
+        return soft_pass(self._graph, self._robot(robot_class), tables, self._temperature, self._stop)
 
     def _lay_out(self) -> None:
         """Number the memories and tabulate how arcs carry them."""

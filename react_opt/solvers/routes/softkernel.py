@@ -117,8 +117,10 @@ def _reached(graph: SoftGraph, robot: SoftRobot) -> IntArray:
 
 
 @inner
-def _sum_completions(graph: SoftGraph, robot: SoftRobot, ahead: FloatArray, earliest: IntArray, heat: float) -> None:
-    """Fill ``ahead``, from the horizon to the start."""
+def _sum_completions(
+    graph: SoftGraph, robot: SoftRobot, ahead: FloatArray, earliest: IntArray, heat: float, stop: NDArray[np.uint8]
+) -> bool:
+    """Fill ``ahead``, from the horizon to the start; return whether it was not told to stop."""
     out_start, arc_to, arc_steps, first = graph.out_start, graph.arc_to, graph.arc_steps, graph.first
     horizon, n = len(robot.gain) - 1, len(first) - 1
     cost, wait_cost = graph.cost / heat, robot.wait_cost / heat
@@ -129,6 +131,8 @@ def _sum_completions(graph: SoftGraph, robot: SoftRobot, ahead: FloatArray, earl
     level, top = np.empty((ways, most)), np.empty(most)
     total = np.empty(most, dtype=np.float32)
     for t in range(horizon, robot.start_step - 1, -1):
+        if stop[0] != 0:
+            return False
         for i in range(n):
             if t < earliest[i]:
                 continue
@@ -168,10 +172,13 @@ def _sum_completions(graph: SoftGraph, robot: SoftRobot, ahead: FloatArray, earl
                 here[m] = high + _log(both)
             for m in range(half, count):
                 here[m] = top[m] + _log(total[m])
+    return True
 
 
 @inner
-def _count_visits(graph: SoftGraph, robot: SoftRobot, tables: SoftTables, heat: float) -> FloatArray:
+def _count_visits(
+    graph: SoftGraph, robot: SoftRobot, tables: SoftTables, heat: float, stop: NDArray[np.uint8]
+) -> FloatArray:
     """Fill ``chance``, from the start to the horizon, and return how often each cell is collected on average."""
     out_start, arc_to, arc_steps, first = graph.out_start, graph.arc_to, graph.arc_steps, graph.first
     ahead, chance = tables.ahead, tables.chance
@@ -181,6 +188,8 @@ def _count_visits(graph: SoftGraph, robot: SoftRobot, tables: SoftTables, heat: 
     chance[robot.start_step :] = 0.0
     chance[robot.start_step, first[robot.start]] = 1.0
     for t in range(robot.start_step, horizon + 1):
+        if stop[0] != 0:
+            break
         for i in range(n):
             low, half = first[i], (first[i + 1] - first[i]) // 2
             earned = robot.gain[t, i] / heat if robot.gain[t, i] > _NONE else NEVER
@@ -209,7 +218,9 @@ def _count_visits(graph: SoftGraph, robot: SoftRobot, tables: SoftTables, heat: 
 
 
 @kernel(nogil=True)
-def soft_pass(graph: SoftGraph, robot: SoftRobot, tables: SoftTables, temperature: float) -> tuple[float, FloatArray]:
+def soft_pass(
+    graph: SoftGraph, robot: SoftRobot, tables: SoftTables, temperature: float, stop: NDArray[np.uint8]
+) -> tuple[float, FloatArray]:
     """Return ``temperature * log(sum over routes of exp(value / temperature))`` and the average collections.
 
     The first is above the value of the best route (prices deducted, battery at the start left out), ``NEVER`` if there
@@ -223,12 +234,15 @@ def soft_pass(graph: SoftGraph, robot: SoftRobot, tables: SoftTables, temperatur
         Filled.
     temperature
         In units of the objective.
+    stop
+        ``(1,)`` flag; once it is not 0 the pass is given up and what it returns means nothing.
     """
-    _sum_completions(graph, robot, tables.ahead, _reached(graph, robot), temperature)
+    if not _sum_completions(graph, robot, tables.ahead, _reached(graph, robot), temperature, stop):
+        return NEVER, np.zeros(len(graph.first) - 1)
     whole = tables.ahead[robot.start_step, graph.first[robot.start]]
     if whole <= _NONE:
         return NEVER, np.zeros(len(graph.first) - 1)
-    return temperature * whole, _count_visits(graph, robot, tables, temperature)
+    return temperature * whole, _count_visits(graph, robot, tables, temperature, stop)
 
 
 @kernel(nogil=True)
