@@ -6,30 +6,37 @@ and the time is what the simulator measures, with the sensors on all the time an
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
-from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.energy import RobotProfile
 from react_opt.geometry.occupancy import OccupancyMap
-from react_opt.instance import Mission, canonical
-from react_opt.jsonio import parse
+from react_opt.instance import Mission
+from react_opt.limits.drive import Drive, nominal
 from react_opt.limits.outlook import Outlook, look_out
-from react_opt.limits.routes import MOST_STOPS, anneal, walk
-from react_opt.orchestrator.belief import Belief
-from react_opt.orchestrator.strategy import Decision, Order, Point
+from react_opt.limits.polish import MOST_POINTS, polish
+from react_opt.limits.ride import law_of
+from react_opt.limits.routes import MOST_STOPS, NEAR, anneal
+from react_opt.orchestrator.strategy import Point
 from react_opt.paths.grid import pull_straight
 from react_opt.paths.motion import terrain
 from react_opt.sim.loop import Simulation
 from react_opt.sim.summary import coverage_times
 from react_opt.sim.world import World
 
-MARGINS = (0.002, 0.006, 0.012)
-"""So much more than the share wanted is planned for, in turn: the search counts a sample of the pixels and scans at
-the standing points, the simulator counts all and its robots cut corners."""
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+ROUNDS = 4
+"""A plan is polished and driven so often; each time as much more is wanted of the sample as the simulator missed."""
+
+_MARGIN = 0.003  # of the sample, more than the share, to begin with
+_SPARE = (0.004, 0.007, 0.002)  # so much more is wanted of routes, in turn: polishing cuts some of it
+_PRICE_S = 4000.0  # for seeing nothing of what is wanted
+_HEAT_S = ((6.0, 0.05), (0.1, 0.01))  # of the routes and of the way points: at the start and at the end
 
 
 @dataclass(frozen=True)
@@ -57,41 +64,6 @@ class FullMapPlan:
     coverage: float
 
 
-class Drive:
-    """An order source that has robots drive given paths (a :class:`react_opt.orchestrator.strategy.Strategy`)."""
-
-    def __init__(self, paths_m: dict[str, tuple[Point, ...]]) -> None:
-        self._left = {name: list(path) for name, path in paths_m.items()}
-        self._sent: set[str] = set()
-
-    def decide(self, belief: Belief) -> Decision:
-        """Send every robot on its way once, and on again where traffic has stopped it."""
-        orders = []
-        for robot in belief.robots:
-            left = self._left.get(robot.id, [])
-            if robot.state not in ("idle", "stuck") or not left:
-                continue
-            way: tuple[Point, ...] = ()
-            if robot.id in self._sent:
-                away = [hypot(x - robot.x_m, y - robot.y_m) for x, y in left]
-                at = int(np.argmin(away))
-                del left[: at + 1 if away[at] < 0.5 else at]
-                way = belief.path(robot, left[0], optimistic=True) if left else ()
-            if left:
-                orders.append(Order(robot.id, (*way, *left)))
-            self._sent.add(robot.id)
-        busy = any(robot.state in ("driving", "yielding") for robot in belief.robots)
-        return Decision(orders, done=not orders and not busy)
-
-
-def nominal(mission: Mission) -> Mission:
-    """Return a mission without noise, failures and radio, its sensors never off: what limits are stated for."""
-    data = canonical(mission)
-    data.update(noise={}, failures=[], link=None, always_on=True, prior_map=None)
-    plain: Mission = parse(data, kind="mission")
-    return plain
-
-
 def best_plan(
     mission: Mission,
     truth: OccupancyMap,
@@ -99,8 +71,9 @@ def best_plan(
     *,
     outlook: Outlook | None = None,
     restarts: int = 3,
-    steps: int = 60_000,
+    steps: int = 600_000,
     seed: int = 0,
+    on_progress: Callable[[], None] | None = None,
 ) -> FullMapPlan:
     """Search for the plan that sees a share of a known building earliest, and drive the best ones.
 
@@ -113,25 +86,41 @@ def best_plan(
     share
         Share of the coverable area wanted, in (0, 1].
     outlook
-        :func:`outlook_of` the mission or of one with more robots; by default made here.
+        :func:`outlook_of` the mission; by default made here.
     restarts
-        How many searches; each one's plan is driven in the simulator and the best measured one returned.
+        How many searches; the best plan as driven is returned.
     steps
-        Moves that each search tries.
+        Moves that each search tries on routes; on way points it tries a tenth of that, in each of :data:`ROUNDS`.
     seed
         Seed of the first search.
+    on_progress
+        Called :data:`ROUNDS` times in each search.
     """
-    seen = outlook_of(mission, truth) if outlook is None else outlook
-    driven = []
+    view = outlook_of(mission, truth) if outlook is None else outlook
+    used = [RobotProfile(**mission.profiles[robot.profile].model_dump()) for robot in mission.robots]
+    laws = _laws(mission, truth, used)
+    most = _most(view, len(used))
+    driven: list[FullMapPlan] = []
     for n in range(restarts):
-        margin = MARGINS[n % len(MARGINS)]
-        for planned_s, paths in _search(mission, seen, share, margin, steps, seed + n):
-            driven.append(_driven(mission, truth, share, planned_s, paths))
-    return min(driven, key=lambda plan: np.inf if plan.time_s is None else plan.time_s)
+        needed = min(most, int(np.ceil((share + _MARGIN) * view.samples)))
+        more = min(most, int(needed + _SPARE[n % len(_SPARE)] * view.samples))
+        ways, counts = _routes(view, used, laws, more, steps, seed + n)
+        for k in range(ROUNDS):
+            planned = polish(
+                view.space.padded, 1 / view.space.resolution_m, ways, counts, view.ground, laws, view.lattice,
+                needed, max(1, steps // 10), *_HEAT_S[1], seed + n + 1000 * k,
+            )  # fmt: skip
+            plan, seen = _driven(mission, truth, share, float(planned), ways, counts)
+            driven.append(plan)
+            # The sample counts squares, the simulator pixels from where the robot is: want as much more as was missing.
+            needed = min(most, max(1, needed + int(np.ceil((share - seen) * view.samples))))
+            if on_progress is not None:
+                on_progress()
+    return min(driven, key=lambda plan: (np.inf if plan.time_s is None else plan.time_s, -plan.coverage))
 
 
 def outlook_of(mission: Mission, truth: OccupancyMap) -> Outlook:
-    """Return the standing points for a mission's robots."""
+    """Return what the planner knows of a building: for a mission's robots, at their starts."""
     used = [RobotProfile(**mission.profiles[robot.profile].model_dump()) for robot in mission.robots]
     starts = np.array([(robot.x_m, robot.y_m) for robot in mission.robots])
     widest = max(used, key=lambda profile: profile.radius_m)
@@ -139,88 +128,60 @@ def outlook_of(mission: Mission, truth: OccupancyMap) -> Outlook:
     return look_out(world, widest, starts)
 
 
-def _search(
-    mission: Mission, seen: Outlook, share: float, margin: float, steps: int, seed: int
-) -> list[tuple[float, dict[str, tuple[Point, ...]]]]:
-    """Return when a team is expected to have seen a share, s, and its paths: as searched, and with corners cut."""
-    places = np.array([(robot.x_m, robot.y_m) for robot in mission.robots])
-    apart = np.hypot(*(seen.points_m[:, None, :] - places[None, :, :]).transpose(2, 0, 1))
-    starts = len(apart) - 1 - np.argmin(apart[::-1], axis=0)
-    used = [mission.profiles[robot.profile] for robot in mission.robots]
-    motion = np.array(
-        [
-            (row.yaw_rad, profile.turn_rad_s, profile.speed_max_m_s / profile.accel_m_s2)
-            for row, profile in zip(mission.robots, used, strict=True)
-        ]
-    )
-    needed = min(_visible(seen, starts), int(np.ceil((share + margin) * seen.samples)))
-    stops, counts = _greedy(seen, starts, needed)
-    view = (seen.points_m, seen.time_s, seen.before, seen.sees)
-    planned = anneal(view, stops, counts, starts, motion, needed, steps, 8.0, seed)
-    paths: dict[str, tuple[Point, ...]] = {}
-    cut: dict[str, tuple[Point, ...]] = {}
-    for r, row in enumerate(mission.robots):
-        node, at_s = np.empty(4096, dtype=np.int64), np.empty(4096)
-        size = walk(view, stops[r], int(counts[r]), int(starts[r]), motion[r], node, at_s)
-        size = int(np.searchsorted(at_s[:size], planned + 1e-9, side="right"))  # what comes later serves nothing
-        profile = RobotProfile(**used[r].model_dump())
-        paths[row.id] = tuple((float(x), float(y)) for x, y in seen.points_m[node[1:size]])
-        cut[row.id] = _straightened(seen, profile, node[:size], stops[r, : counts[r]])
-    return [(float(planned), paths), (float(planned), cut)]
+def _laws(mission: Mission, truth: OccupancyMap, used: list[RobotProfile]) -> FloatArray:
+    """Return each robot's start pose on the grid and its limits."""
+    rows = []
+    for row, profile in zip(mission.robots, used, strict=True):
+        u, v = truth.world_to_pixel((row.x_m, row.y_m)) * truth.resolution_m
+        rows.append(law_of(profile, float(u), float(v), row.yaw_rad - truth.origin_yaw_rad))
+    return np.array(rows)
 
 
-def _visible(seen: Outlook, starts: NDArray[np.int64]) -> int:
-    """Return how many sampled pixels are seen from anywhere the robots can come; no plan here sees more."""
-    reached = np.isfinite(seen.time_s[starts]).any(axis=0)
-    return int(np.bitwise_count(np.bitwise_or.reduce(seen.sees[reached], axis=0)).sum())
+def _most(view: Outlook, robots: int) -> int:
+    """Return how many sampled pixels are seen from anywhere that the robots' ways lead; no plan here sees more."""
+    n = len(view.chosen)
+    reached = np.flatnonzero(np.isfinite(view.time_s[n - robots :]).any(axis=0))
+    alone = view.seen[reached * (reached + 1) // 2 + reached]
+    return int(np.bitwise_count(np.bitwise_or.reduce(alone, axis=0)).sum())
 
 
-def _greedy(seen: Outlook, starts: NDArray[np.int64], needed: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return first routes: the robot that is free first takes the point that shows most per second of driving."""
-    robots = len(starts)
+def _routes(
+    view: Outlook, used: list[RobotProfile], laws: FloatArray, needed: int, steps: int, seed: int
+) -> tuple[FloatArray, IntArray]:
+    """Return the way points of good routes, ``(robots, MOST_POINTS, 2)`` grid metres, and how many count."""
+    robots, points = len(used), len(view.chosen)
+    starts = np.arange(points - robots, points)
+    near = np.ascontiguousarray(np.argsort(view.time_s, axis=1, kind="stable")[:, 1 : 1 + NEAR])
     stops, counts = np.zeros((robots, MOST_STOPS), dtype=np.int64), np.zeros(robots, dtype=np.int64)
-    at, clock = starts.copy(), np.zeros(robots)
-    known = np.bitwise_or.reduce(seen.sees[starts], axis=0)
-    while int(np.bitwise_count(known).sum()) < needed and counts.max() < MOST_STOPS // 2:
-        r = int(np.argmin(clock))
-        gain = np.bitwise_count(seen.sees & ~known).sum(axis=1) / (seen.time_s[at[r]] + 2.0)
-        best = int(np.argmax(gain))
-        if gain[best] <= 0:
-            break
-        stops[r, counts[r]] = best
-        counts[r] += 1
-        clock[r] += seen.time_s[at[r], best] + 1.0
-        known |= seen.sees[best]
-        at[r] = best
-    return stops, counts
-
-
-def _straightened(
-    seen: Outlook, profile: RobotProfile, nodes: NDArray[np.int64], stops: NDArray[np.int64]
-) -> tuple[Point, ...]:
-    """Return way points: between the points to visit, bends that serve nothing are left out."""
-    field = terrain(seen.space, profile)
-    pixels = np.ascontiguousarray(seen.space.to_pixels(seen.points_m[nodes]))
-    cuts, at = [0], 0
-    for stop in stops:
-        later = np.flatnonzero(nodes[at:] == stop)
-        if len(later):
-            at += int(later[0])
-            cuts.append(at)
-    cuts.append(len(nodes) - 1)
-    points: list[Point] = []
-    for first, last in pairwise(cuts):
-        if last > first:
-            leg = pull_straight(seen.space.padded, field, pixels[first : last + 1], True, 1 / profile.turn_rad_s)
-            points += [(float(x), float(y)) for x, y in seen.space.to_world(leg[1:])]
-    return tuple(points)
+    net = (view.time_s, view.out_rad, view.into_rad, view.loss_s, view.seen)
+    price_s = _PRICE_S / max(1, needed)
+    anneal(net, near, stops, counts, starts, laws[:, 2].copy(), needed, price_s, steps, *_HEAT_S[0], seed)
+    ways, found = np.zeros((robots, MOST_POINTS, 2)), np.zeros(robots, dtype=np.int64)
+    for r, profile in enumerate(used):
+        field, here, way = terrain(view.space, profile), int(starts[r]), []
+        for stop in stops[r, : counts[r]].tolist():
+            if stop != here and np.isfinite(view.time_s[here, stop]):
+                leg = view.pixels(view.way(here, stop))
+                way.append(pull_straight(view.space.padded, field, leg, True, 1 / profile.turn_rad_s)[1:])
+                here = stop
+        if way:
+            joined = np.concatenate(way)[:MOST_POINTS] * view.space.resolution_m
+            found[r], ways[r, : len(joined)] = len(joined), joined
+    return ways, found
 
 
 def _driven(
-    mission: Mission, truth: OccupancyMap, share: float, planned_s: float, paths: dict[str, tuple[Point, ...]]
-) -> FullMapPlan:
-    """Drive paths in the simulator and see when the share is known."""
+    mission: Mission, truth: OccupancyMap, share: float, planned_s: float, ways: FloatArray, counts: IntArray
+) -> tuple[FullMapPlan, float]:
+    """Drive ways in the simulator; return the plan with what was measured, and the share seen when it was planned."""
+    world = [truth.pixel_to_world(ways[r, :count] / truth.resolution_m) for r, count in enumerate(counts)]
+    paths = {
+        row.id: tuple((float(x), float(y)) for x, y in points)
+        for row, points in zip(mission.robots, world, strict=True)
+    }
     trace = Simulation(nominal(mission), truth, strategy=Drive(paths)).run()
     times = coverage_times(trace)
     at = float(times[max(0, int(np.ceil(share * len(times) - 1e-9)) - 1)])
-    return FullMapPlan(share, at if np.isfinite(at) else None, planned_s, paths, float(np.isfinite(times).mean()))
+    coverage = float(np.isfinite(times).mean())
+    plan = FullMapPlan(share, at if np.isfinite(at) else None, planned_s, paths, coverage)
+    return plan, float((times <= planned_s).mean())

@@ -1,28 +1,32 @@
 """Routes of a team through standing points that see a share of a known building early: simulated annealing.
 
-A solution is a list of points to visit per robot; robots drive the fastest ways between them and scan at every point
-they come by. Its worth is the time at which the team has seen the share wanted, turns and stops included. Moves:
-insert, drop, replace (often by a point near by), move to another place or robot, exchange, and reverse a stretch
-(Kirkpatrick, Gelatt and Vecchi 1983; the neighbourhoods are those of vehicle routing).
+A solution is a list of points to visit per robot; robots drive the known ways between them, and see while they drive.
+Its cost is the time at which the last robot is done, and a penalty for each pixel that is missing. Moves: insert where
+it takes least time, drop, replace by a point near by, move stretches within and between robots, reverse, exchange
+tails (Kirkpatrick, Gelatt and Vecchi 1983; the neighbourhoods are those of vehicle routing), and ruin and recreate: a
+few stops that follow each other are taken out, and what shows most per second is put in (Schrimpf et al. 2000).
 """
 
 from __future__ import annotations
 
-from math import atan2, exp, pi
+from math import inf, log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
+from react_opt.limits.legs import Bits, lost_s, turned
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-# Points (n, 2), m; times (n, n), s; points before (n, n); what each sees (n, words).
-View = tuple[FloatArray, FloatArray, NDArray[np.int32], NDArray[np.uint64]]
+# Times (n, n), s; headings at both ends, rad; what bends cost, s; what is seen on the ways (react_opt.limits.outlook).
+Net = tuple[FloatArray, FloatArray, FloatArray, FloatArray, Bits]
 
-MOST_STOPS = 120
-_PENALTY_S = 1500.0  # for seeing nothing of what is wanted
-_SHARP_RAD = 0.6  # beyond this a robot slows down, or turns on the spot
+MOST_STOPS = 160
+NEAR = 24
+"""A stop is replaced by one of so many nearest ones."""
+
+_SPREAD = 0.02  # weight of the sum of all robots' times, beside the longest
 
 
 @kernel
@@ -35,133 +39,108 @@ def popcount(word: np.uint64) -> int:
 
 
 @kernel
-def walk(
-    view: View, stops: IntArray, count: int, start: int, motion: FloatArray, node: IntArray, at_s: FloatArray
-) -> int:
-    """Write the points that a robot comes by, and when, and return how many.
-
-    Parameters
-    ----------
-    view
-        The standing points.
-    stops, count
-        The points to visit, and how many count.
-    start
-        The point where the robot starts.
-    motion
-        Its heading (rad), speed of turning (rad/s), and what a stop costs (s).
-    node, at_s
-        Receive the points and the times, s.
-    """
-    points, time, before, _ = view
-    node[0], at_s[0] = start, 0.0
-    heading, size, clock = motion[0], 1, motion[2] / 2
-    for n in range(count):
-        here, goal = node[size - 1], stops[n]
-        if here == goal or not np.isfinite(time[here, goal]):
-            continue
-        length, k = 0, goal
-        while k != here:
-            length += 1
-            k = before[here, k]
-        if size + length >= node.shape[0]:
-            return size
-        k = goal
-        for back in range(length):
-            node[size + length - 1 - back] = k
-            k = before[here, k]
-        for m in range(size, size + length):
-            a, b = node[m - 1], node[m]
-            direction = atan2(points[b, 1] - points[a, 1], points[b, 0] - points[a, 0])
-            turn = abs(direction - heading)
-            turn = min(turn, 2 * pi - turn)
-            if turn > _SHARP_RAD:
-                clock += turn / motion[1] + motion[2]
-            heading = direction
-            clock += time[here, b] - time[here, a]
-            at_s[m] = clock
-        size += length
-    return size
+def leg(i: int, j: int) -> int:
+    """Return where what is seen on the way between two points stands."""
+    return i * (i + 1) // 2 + j if i >= j else j * (j + 1) // 2 + i
 
 
 @kernel
-def seen_s(
-    view: View, stops: IntArray, counts: IntArray, starts: IntArray, motion: FloatArray, needed: int,
-    node: IntArray, at_s: FloatArray, seen: NDArray[np.uint64],
-) -> float:  # fmt: skip
-    """Return when a team has seen so many sampled pixels, s; later than its end by a penalty where it never has."""
-    sees = view[3]
-    robots, words = counts.shape[0], sees.shape[1]
-    size, at = np.zeros(robots, dtype=np.int64), np.zeros(robots, dtype=np.int64)
-    for r in range(robots):
-        size[r] = walk(view, stops[r], counts[r], starts[r], motion[r], node[r], at_s[r])
+def route_s(net: Net, stops: IntArray, count: int, start: int, heading: float) -> float:
+    """Return how long a robot drives along its stops, s; infinite where there is no way."""
+    time, out, into, loss, _ = net
+    clock, here = 0.0, start
+    for n in range(count):
+        goal = stops[n]
+        if goal == here:
+            continue
+        clock += time[here, goal] + lost_s(loss, turned(out[here, goal], heading))
+        heading, here = into[here, goal], goal
+    return clock
+
+
+@kernel
+def seen_by(net: Net, stops: IntArray, counts: IntArray, starts: IntArray, seen: Bits) -> int:
+    """Write what a team sees; return how many sampled pixels."""
+    views = net[4]
+    words = views.shape[1]
     seen[:] = 0
-    total, clock = 0, 0.0
-    while True:
-        best = -1
-        for r in range(robots):
-            if at[r] < size[r] and (best < 0 or at_s[r, at[r]] < at_s[best, at[best]]):
-                best = r
-        if best < 0:
-            return float(clock + _PENALTY_S * (needed - total) / needed)
-        k, clock = node[best, at[best]], at_s[best, at[best]]
-        at[best] += 1
+    for r in range(counts.shape[0]):
+        here = starts[r]
+        view = views[leg(here, here)]
         for w in range(words):
-            new = sees[k, w] & ~seen[w]
-            if new:
-                total += popcount(new)
-                seen[w] |= new
-        if total >= needed:
-            return float(clock)
+            seen[w] |= view[w]
+        for n in range(counts[r]):
+            view = views[leg(here, stops[r, n])]
+            for w in range(words):
+                seen[w] |= view[w]
+            here = stops[r, n]
+    total = 0
+    for w in range(words):
+        total += popcount(seen[w])
+    return total
 
 
 @kernel
 def anneal(
-    view: View, stops: IntArray, counts: IntArray, starts: IntArray, motion: FloatArray, needed: int, steps: int,
-    hot_s: float, seed: int,
+    net: Net, near: IntArray, stops: IntArray, counts: IntArray, starts: IntArray, headings: FloatArray, needed: int,
+    price_s: float, steps: int, hot_s: float, cold_s: float, seed: int,
 ) -> float:  # fmt: skip
-    """Improve a team's routes in place; return when they have seen what is wanted, s.
+    """Improve a team's routes in place; return their cost, s.
 
     Parameters
     ----------
-    view, starts, motion
-        As in :func:`walk`, one row per robot.
+    net, near
+        The points and the ways between them; the nearest ones of each.
     stops, counts
         ``(robots, MOST_STOPS)`` points to visit, and how many count.
+    starts, headings
+        Where the robots start and look, rad.
     needed
         Sampled pixels wanted.
+    price_s
+        Penalty for each one that is missing, s.
     steps
         Moves to try.
-    hot_s
-        Temperature at the start, s; a thousandth of it at the end.
+    hot_s, cold_s
+        Temperature at the start and at the end, s.
     seed
         Seed of the moves.
     """
     np.random.seed(seed)  # noqa: NPY002  (numba's own generator)
-    robots, points = counts.shape[0], view[0].shape[0]
-    longest = 4096
-    node, at_s = np.empty((robots, longest), dtype=np.int64), np.empty((robots, longest))
-    seen = np.zeros(view[3].shape[1], dtype=np.uint64)
-    now = seen_s(view, stops, counts, starts, motion, needed, node, at_s, seen)
-    best, best_stops, best_counts = now, stops.copy(), counts.copy()
+    robots = counts.shape[0]
+    seen = np.zeros(net[4].shape[1], dtype=np.uint64)
+    now = inf
+    best, best_stops, best_counts = inf, stops.copy(), counts.copy()
     old_stops, old_counts = stops.copy(), counts.copy()
-    for step in range(steps):
-        heat = hot_s * 0.001 ** (step / steps)
-        old_stops[:], old_counts[:] = stops, counts
-        _move(view, stops, counts, points)
-        if np.random.random() < 0.3:  # noqa: NPY002
-            _move(view, stops, counts, points)
-        then = seen_s(view, stops, counts, starts, motion, needed, node, at_s, seen)
-        then += 0.002 * counts.sum()
-        if then <= now or np.random.random() < exp((now - then) / heat):  # noqa: NPY002
-            now = then
-            if then < best:
-                best = then
+    times = np.zeros(robots)
+    for step in range(-1, steps):
+        heat = hot_s * (cold_s / hot_s) ** (max(0, step) / steps)
+        limit = inf
+        if step >= 0:
+            for r in range(robots):
+                old_counts[r] = counts[r]
+                old_stops[r, : counts[r]] = stops[r, : counts[r]]
+            limit = now - heat * log(1.0 - np.random.random())  # noqa: NPY002
+            _move(net, near, stops, counts, starts, headings, seen)
+        longest, total = 0.0, 0.0
+        for r in range(robots):
+            times[r] = route_s(net, stops[r], counts[r], starts[r], headings[r])
+            longest, total = max(longest, times[r]), total + times[r]
+        cost = longest + _SPREAD * total
+        if cost <= limit:
+            missing = needed - seen_by(net, stops, counts, starts, seen)
+            cost += price_s * max(0, missing)
+        if cost <= limit:
+            now = cost
+            if cost < best:
+                best = cost
                 best_stops[:], best_counts[:] = stops, counts
         else:
-            stops[:], counts[:] = old_stops, old_counts
+            for r in range(robots):
+                counts[r] = old_counts[r]
+                stops[r, : counts[r]] = old_stops[r, : counts[r]]
     stops[:], counts[:] = best_stops, best_counts
-    return seen_s(view, stops, counts, starts, motion, needed, node, at_s, seen)
+    return best
 
 
 @kernel
@@ -184,48 +163,105 @@ def _drop(stops: IntArray, counts: IntArray, r: int, at: int) -> int:
 
 
 @kernel
-def _near(view: View, point: int, within_m: float) -> int:
-    """Return a random point near another one, itself where none is found quickly."""
-    points = view[0]
-    for _ in range(60):
-        k = np.random.randint(points.shape[0])  # noqa: NPY002
-        if abs(points[k, 0] - points[point, 0]) < within_m and abs(points[k, 1] - points[point, 1]) < within_m:
-            return k
-    return point
+def _cheapest(net: Net, stops: IntArray, counts: IntArray, starts: IntArray, r: int, point: int) -> tuple[int, float]:
+    """Return where in a robot's route a point adds least time, and how much, s (bends aside)."""
+    time = net[0]
+    best, where, here = inf, 0, starts[r]
+    for n in range(counts[r] + 1):
+        more = time[here, point]
+        if n < counts[r]:
+            goal = stops[r, n]
+            more += time[point, goal] - time[here, goal]
+            here = goal
+        if more < best:
+            best, where = more, n
+    return where, best
 
 
 @kernel
-def _move(view: View, stops: IntArray, counts: IntArray, points: int) -> None:
+def _insert(net: Net, stops: IntArray, counts: IntArray, starts: IntArray, r: int, point: int) -> None:
+    where, _ = _cheapest(net, stops, counts, starts, r, point)
+    _put(stops, counts, r, where, point)
+
+
+@kernel
+def _move(
+    net: Net, near: IntArray, stops: IntArray, counts: IntArray, starts: IntArray, headings: FloatArray, seen: Bits
+) -> None:
     """Change the routes at random."""
-    robots = counts.shape[0]
+    robots, points = counts.shape[0], near.shape[0]
     r, q = np.random.randint(robots), np.random.randint(robots)  # noqa: NPY002
-    kind = np.random.randint(8)  # noqa: NPY002
-    if counts[r] == 0 or kind == 0:
-        _put(stops, counts, r, np.random.randint(counts[r] + 1), np.random.randint(points))  # noqa: NPY002
+    kind = np.random.randint(100)  # noqa: NPY002
+    if counts[r] == 0 or kind < 16:
+        _insert(net, stops, counts, starts, r, np.random.randint(points))  # noqa: NPY002
         return
     at = np.random.randint(counts[r])  # noqa: NPY002
-    if kind == 1:
+    if kind < 30:
         _drop(stops, counts, r, at)
-    elif kind == 2 or kind == 3:
-        stops[r, at] = _near(view, stops[r, at], 1.1 if kind == 2 else 4.0)
-    elif kind == 4:
+    elif kind < 55:
+        stops[r, at] = near[stops[r, at], np.random.randint(near.shape[1])]  # noqa: NPY002
+        if kind < 35 and at + 1 < counts[r]:  # and the one after it goes
+            _drop(stops, counts, r, at + 1)
+    elif kind < 63:
         point = _drop(stops, counts, r, at)
-        _put(stops, counts, q, np.random.randint(counts[q] + 1), point)  # noqa: NPY002
-    elif kind == 5:
-        if counts[q] > 0:
-            other = np.random.randint(counts[q])  # noqa: NPY002
-            stops[r, at], stops[q, other] = stops[q, other], stops[r, at]
-    elif kind == 6:
-        last = np.random.randint(at, counts[r])  # noqa: NPY002
+        _insert(net, stops, counts, starts, q, point)
+    elif kind < 75:  # a stretch moves, some reversed
+        length = min(1 + np.random.randint(8), counts[r] - at)  # noqa: NPY002
+        part = stops[r, at : at + length].copy()
+        for _ in range(length):
+            _drop(stops, counts, r, at)
+        if np.random.random() < 0.5:  # noqa: NPY002
+            part = part[::-1].copy()
+        to, _ = _cheapest(net, stops, counts, starts, q, part[0])
+        if np.random.random() < 0.3:  # noqa: NPY002
+            to = np.random.randint(counts[q] + 1)  # noqa: NPY002
+        for k in range(length):
+            _put(stops, counts, q, to + k, part[k])
+    elif kind < 86:
+        last = min(counts[r] - 1, at + 1 + np.random.randint(30))  # noqa: NPY002
         while at < last:
             stops[r, at], stops[r, last] = stops[r, last], stops[r, at]
             at, last = at + 1, last - 1
-    elif q != r and counts[q] > 0:  # exchange the tails
-        other = np.random.randint(counts[q])  # noqa: NPY002
-        mine, theirs = stops[r, at : counts[r]].copy(), stops[q, other : counts[q]].copy()
-        if at + theirs.shape[0] <= stops.shape[1] and other + mine.shape[0] <= stops.shape[1]:
-            stops[r, at : at + theirs.shape[0]] = theirs
-            stops[q, other : other + mine.shape[0]] = mine
-            counts[r], counts[q] = at + theirs.shape[0], other + mine.shape[0]
+    elif kind < 92:
+        if q != r and counts[q] > 0:  # exchange the tails
+            other = np.random.randint(counts[q] + 1)  # noqa: NPY002
+            mine, theirs = stops[r, at : counts[r]].copy(), stops[q, other : counts[q]].copy()
+            if at + theirs.shape[0] <= stops.shape[1] and other + mine.shape[0] <= stops.shape[1]:
+                stops[r, at : at + theirs.shape[0]] = theirs
+                stops[q, other : other + mine.shape[0]] = mine
+                counts[r], counts[q] = at + theirs.shape[0], other + mine.shape[0]
+        else:
+            counts[r] = at  # the rest is left out
+    elif kind < 97:
+        _put(stops, counts, r, at, near[stops[r, at], np.random.randint(near.shape[1])])  # noqa: NPY002
     else:
-        _put(stops, counts, r, at, _near(view, stops[r, at], 4.0))
+        _recreate(net, stops, counts, starts, r, at, seen)
+
+
+@kernel
+def _recreate(net: Net, stops: IntArray, counts: IntArray, starts: IntArray, r: int, at: int, seen: Bits) -> None:
+    """Take some stops out and put in what shows most per second."""
+    views = net[4]
+    words = views.shape[1]
+    length = min(2 + np.random.randint(6), counts[r] - at)  # noqa: NPY002
+    for _ in range(length):
+        _drop(stops, counts, r, at)
+    for _ in range(length + np.random.randint(2)):  # noqa: NPY002
+        seen_by(net, stops, counts, starts, seen)
+        best, point, robot, where = 0.0, -1, 0, 0
+        for k in range(net[0].shape[0]):
+            if np.random.random() < 0.7:  # noqa: NPY002  (some at a time: quicker, and other ones each time)
+                continue
+            view, gain = views[leg(k, k)], 0
+            for w in range(words):
+                gain += popcount(view[w] & ~seen[w])
+            if gain == 0:
+                continue
+            for q in range(counts.shape[0]):
+                to, more = _cheapest(net, stops, counts, starts, q, k)
+                rate = gain / (1.0 + max(0.0, more))
+                if rate > best:
+                    best, point, robot, where = rate, k, q, to
+        if point < 0:
+            return
+        _put(stops, counts, robot, where, point)

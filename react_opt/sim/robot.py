@@ -27,7 +27,8 @@ ARRIVED_M = 0.1
 CREEP_M_S = 0.05
 """Below this speed a robot turns on the spot."""
 
-_SHARP_RAD = 0.8  # beyond this heading error it does not drive at all
+SHARP_RAD = 0.8
+"""Beyond this heading error a robot does not drive at all, rad."""
 
 Point = tuple[float, float]
 
@@ -134,7 +135,7 @@ class SimRobot:
         away = hypot(goal[0] - self.u_m, goal[1] - self.v_m)
         error = wrapped(atan2(goal[1] - self.v_m, goal[0] - self.u_m) - self.heading_rad)
         turn = min(max(error, -self.profile.turn_rad_s * dt), self.profile.turn_rad_s * dt)
-        if abs(error) > _SHARP_RAD:
+        if abs(error) > SHARP_RAD:
             wanted = 0.0
         else:
             brake = sqrt(self.limits_m_s[0] ** 2 + 2 * 0.8 * self.profile.accel_m_s2 * away)
