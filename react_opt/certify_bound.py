@@ -29,8 +29,6 @@ from react_opt.certify_bound_route import Prices, best_route
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance, OrosRobot
 
-DEEPEST = 900  # questions in a row
-
 
 @dataclass(frozen=True)
 class _Part:
@@ -91,16 +89,29 @@ def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float
     memory = _memory(instance, certificate)
     if kind == "lagrangian":
         return _explored_value(instance) + _rounded(instance, _bound_of(instance, certificate, memory, whole))
-    worst, waiting = -math.inf, [(certificate["tree"], whole, 0)]
-    while waiting:
-        node, part, depth = waiting.pop()
+    return _explored_value(instance) + _rounded(instance, _bound_of_tree(instance, certificate["tree"], memory, whole))
+
+
+def _bound_of_tree(
+    instance: OrosInstance, tree: list[Mapping[str, Any]], memory: list[list[int]], whole: _Part
+) -> float:
+    """Return the largest bound of the leaves; a node's answers stand after it in the list, each asked about once."""
+    part_of, worst = {0: whole}, -math.inf
+    for place, node in enumerate(tree):
+        if place not in part_of:
+            raise UsageError("the certificate's tree is none: nothing leads to one of its parts")
+        part = part_of.pop(place)
         if "cell" not in node:
             worst = max(worst, _bound_of(instance, node, memory, part))
             continue
-        if depth == DEEPEST or not 0 <= int(node["cell"]) < shape[1]:
-            raise UsageError("the certificate's tree is too deep or asks about a cell that the instance does not have")
-        waiting += [(node[side], part.side(node, side == "yes"), depth + 1) for side in ("yes", "no")]
-    return _explored_value(instance) + _rounded(instance, worst)
+        if not 0 <= int(node["cell"]) < len(instance.cells):
+            raise UsageError("the certificate's tree asks about a cell that the instance does not have")
+        for side in ("yes", "no"):
+            answer = int(node[side])
+            if not place < answer < len(tree) or answer in part_of:
+                raise UsageError("the certificate's tree is none: an answer is before its question or used twice")
+            part_of[answer] = part.side(node, side == "yes")
+    return worst
 
 
 def _explored_value(instance: OrosInstance) -> float:

@@ -6,6 +6,7 @@ import pytest
 from react_opt.certify_bound import recompute_bound
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance
+from react_opt.plan import Claim
 from react_opt.solvers.routes import engine
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.finish import Finish
@@ -123,7 +124,7 @@ def test_the_bound_of_a_tree_is_recomputed_from_its_leaves(seed: int, monkeypatc
         forged = json.loads(json.dumps(result.certificate))
         _lower(forged["tree"])
         assert recompute_bound(instance, forged) >= best - 1e-9 * best
-        del forged["tree"]["no"]
+        del forged["tree"][0]["no"]
         with pytest.raises(UsageError, match="KeyError: 'no'"):
             recompute_bound(instance, forged)
 
@@ -152,14 +153,27 @@ def test_a_bound_that_rests_on_enumeration_is_recomputed(monkeypatch: pytest.Mon
     assert enumerated >= 3
 
 
-def _lower(node: dict) -> None:
+def _lower(tree: list[dict]) -> None:
     """Make every leaf of a certificate claim three less for each class."""
-    if "cell" in node:
-        _lower(node["yes"])
-        _lower(node["no"])
-    else:
-        for group in node["classes"]:
-            group["best"] -= 3.0
+    for group in (group for node in tree if "cell" not in node for group in node["classes"]):
+        group["best"] -= 3.0
+
+
+def test_trees_are_deeper_than_documents_may_be_nested() -> None:
+    """A chain of a hundred questions: those who answer yes to the last are bounded by its leaf, as all others are. An
+    answer that stands before its question, or that two questions share, is refused."""
+    instance = _instance(1, 5000.0)
+    problem = route_problem(instance)
+    result = solve_routes(problem, work_limit=2000)
+    leaf = {key: value for key, value in result.certificate.items() if key not in ("kind", "memory")}
+    chain = [{"cell": 1, "by": 9, "yes": 2 * k + 1, "no": 2 * k + 2} for k in range(100)]
+    tree = [leaf if place % 2 else chain[place // 2] for place in range(200)] + [leaf]
+    proof = {"kind": "tree", "bound": leaf["bound"], "memory": result.certificate["memory"], "tree": tree}
+    Claim(status="feasible", certificate=proof)
+    assert recompute_bound(instance, proof) >= result.objective - 1e-9
+    for answers in ({"yes": 0}, {"yes": 2}, {"no": 201}, {"no": 3}):
+        with pytest.raises(UsageError, match="tree is none"):
+            recompute_bound(instance, {**proof, "tree": [{**tree[0], **answers}, *tree[1:]]})
 
 
 def test_certificate_of_another_instance_is_refused() -> None:

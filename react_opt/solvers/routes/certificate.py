@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -51,8 +52,10 @@ def certificate(
 def tree_certificate(problem: RouteProblem, memory: Memory, root: Part, joule_price: Sequence[float]) -> dict[str, Any]:
     """Return the certificate of a tree: its questions, and prices at each leaf.
 
-    An inner node is ``{"cell", "by" | "robots", "yes", "no"}``: is the cell collected by that instant, or by one of
-    those robots? A leaf holds what :func:`certificate` does but for the memory, which is the same everywhere.
+    ``tree`` is a list that begins with the root. An inner node is ``{"cell", "by" | "robots", "yes", "no"}``: is the
+    cell collected by that instant, or by one of those robots? ``yes`` and ``no`` are positions in the list, after that
+    of the node (a tree may be deeper than JSON should be nested). A leaf holds what :func:`certificate` does but for
+    the memory, which is the same everywhere.
 
     Parameters
     ----------
@@ -65,23 +68,22 @@ def tree_certificate(problem: RouteProblem, memory: Memory, root: Part, joule_pr
     joule_price
         As for :func:`certificate`.
     """
-
-    def written(part: Part) -> dict[str, Any]:
+    parts, nodes = [root], list[dict[str, Any]]()
+    bound = -math.inf
+    for part in parts:  # grows on the way
         split = part.split
-        if split is None or part.yes is None or part.no is None:
-            if part.enumerated is not None and part.enumerated[1] <= part.bound:
-                return _prices(problem, part.enumerated[0], joule_price, part.enumerated[1])
-            return _prices(problem, part.known, joule_price)
-        robots = list(problem.classes[split.group].robots)
-        question = {"robots": robots} if split.by is None else {"by": split.by}
-        return {"cell": split.cell, **question, "yes": written(part.yes), "no": written(part.no)}
-
-    def proven(part: Part) -> float:
-        if part.split is None or part.yes is None or part.no is None:
-            return part.bound
-        return max(proven(part.yes), proven(part.no))
-
-    return {"kind": "tree", "bound": proven(root), "memory": _remembered(memory), "tree": written(root)}
+        if split is not None and part.yes is not None and part.no is not None:
+            robots = list(problem.classes[split.group].robots)
+            question = {"robots": robots} if split.by is None else {"by": split.by}
+            nodes.append({"cell": split.cell, **question, "yes": len(parts), "no": len(parts) + 1})
+            parts += [part.yes, part.no]
+            continue
+        bound = max(bound, part.bound)
+        if part.enumerated is not None and part.enumerated[1] <= part.bound:
+            nodes.append(_prices(problem, part.enumerated[0], joule_price, part.enumerated[1]))
+        else:
+            nodes.append(_prices(problem, part.known, joule_price))
+    return {"kind": "tree", "bound": bound, "memory": _remembered(memory), "tree": nodes}
 
 
 def _remembered(memory: Memory) -> str | list[list[int]]:
