@@ -200,7 +200,7 @@ def _robot(rng: Rng, data: Data, k: int) -> Data:
     return {"id": f"r{k}", "start": _cell(rng, data), "battery_j": battery_j, "capacity_j": battery_j, **powers}
 
 
-def compared(instance: OrosInstance, *, by_brute_force: bool, work_limit: int = 4000) -> tuple[str, list[str]]:
+def compared(instance: OrosInstance, *, by_brute_force: bool, work_limit: int = 1000) -> tuple[str, list[str]]:
     """Return how the decomposition ended and what differs, in words.
 
     Parameters
