@@ -64,7 +64,7 @@ class Standing:
         Shifted geometric mean of the primal integrals, as shares of the limit (shift 0.01); None where no
         instance has a plan.
     wrong
-        Answers that were exposed.
+        Its instances on which an answer was exposed.
     late
         Runs that returned after 1.1 times the limit and 0.1 s.
     """
@@ -83,6 +83,8 @@ class Standing:
 
 def standings(runs: Sequence[Run], exposed: Sequence[Exposure]) -> list[Standing]:
     """Return how each solver did, the one that solved most (then the fastest) first."""
+    met = {(run["peer"], run["instance"]) for run in runs}
+    exposed = [item for item in exposed if (item.peer, item.instance) in met]
     wrong = {(item.peer, item.instance) for item in exposed}
     truths = truths_of(runs)
     rows = []
@@ -99,7 +101,7 @@ def standings(runs: Sequence[Run], exposed: Sequence[Exposure]) -> list[Standing
                 without=sum(not is_right(run) and run["status"] != "infeasible" for run, _ in mine),
                 mean_s=shifted_mean([counted_s(run, wrong) for run, _ in mine]),
                 primal=shifted_mean(integrals, 0.01) if integrals else None,
-                wrong=sum(item.peer == peer for item in exposed),
+                wrong=sum(name == peer for name, _ in wrong),
                 late=sum(run.get("wall_s", 0.0) > 1.1 * run["limit_s"] + 0.1 for run, _ in mine),
             )
         )

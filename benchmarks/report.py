@@ -21,7 +21,7 @@ from react_opt.errors import InputError, UsageError
 from react_opt.jobs_file import read_lines
 
 OURS = "react_opt"
-OPTIONS = {"limit_s": "time-limit"}
+OPTIONS = {"limit_s": "time-limit", "memory_mb": "memory-mb", "cluster": "ray", "only": "solver", "peer_files": "peer"}
 
 
 @dataclass(frozen=True)
@@ -237,8 +237,12 @@ def _provenance(found: Results) -> list[page.Block]:
 def _command(header: Mapping[str, Any]) -> str:
     """Return the command that made a part of the results."""
     settings = header.get("settings", {})
-    chosen = {key: settings[key] for key in ("workers", "threads", "seed", "limit_s") if settings.get(key)}
-    options = "".join(f" --{OPTIONS.get(key, key)} {value:g}" for key, value in chosen.items())
+    options = ""
+    for key in ("workers", "threads", "seed", "limit_s", "memory_mb", "cluster", "only", "peer_files"):
+        given = settings.get(key) or ()
+        for value in given if isinstance(given, list | tuple) else (given,):
+            shown = Path(value).name if key == "peer_files" else f"{value:g}" if isinstance(value, float) else value
+            options += f" --{OPTIONS.get(key, key)} {shown}"
     return f"react-opt bench {header['suite']}{options} -o results.jsonl --report results.md"
 
 

@@ -94,6 +94,9 @@ def run(
             plan = solver.solve(instance, Limits(time_s, threads, seed, gap), tell)
         except ReactError as error:  # what it says on purpose: it cannot state this instance
             return {**facts, "status": "refused", "reason": str(error).splitlines()[0]}
+    expected = f"{instance.kind}_plan"
+    if getattr(plan, "kind", None) != expected:
+        raise TypeError(f"the solver returned {type(plan).__name__}: expected a plan of kind {expected}")
     wall_s = time.perf_counter() - begun - plan.claim.wall_s.get("warm_up", 0.0)
     found = check(instance, plan)
     claim = plan.claim

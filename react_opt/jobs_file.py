@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
+import logging
 import os
+import stat
 import time
 from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO
@@ -14,7 +16,7 @@ from react_opt.errors import InputError, UsageError
 
 
 def read_lines(file: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Return the lines of a results file; half a line at its end is left out.
+    """Return the lines of a results file; a broken one at its end is left out.
 
     Raises
     ------
@@ -24,7 +26,7 @@ def read_lines(file: str | os.PathLike[str]) -> list[dict[str, Any]]:
     name = os.fspath(file)
     try:
         with open(name, "rb") as handle:
-            return _parsed(handle.read(), name)
+            return _parsed(handle.read(), name)[0]
     except OSError as error:
         raise InputError.single(name, "", f"cannot be read: {error.strerror or error}") from None
 
@@ -36,7 +38,8 @@ def opened(file: str | os.PathLike[str], kind: str | None = None) -> Iterator[tu
     Parameters
     ----------
     file
-        The file, which is made where there is none. Half a line at its end is cut off.
+        The file, which is made where there is none. A broken line at its end, which a kill or a full disk left behind,
+        is cut off, and the ``react_opt`` logger says so.
     kind
         What the first line says of its ``kind``; None for anything.
 
@@ -50,17 +53,24 @@ def opened(file: str | os.PathLike[str], kind: str | None = None) -> Iterator[tu
     name = os.fspath(file)
     try:
         handle = open(name, "a+b", buffering=0)  # noqa: SIM115  (closed below)
+        regular = stat.S_ISREG(os.fstat(handle.fileno()).st_mode)
     except OSError as error:
         raise InputError.single(name, "", f"cannot be written: {error.strerror or error}") from None
     with handle:
+        if not regular:
+            raise InputError.single(name, "", "cannot be written: expected a regular file")
         if not _locked(handle):
             raise UsageError(f"{name}: another process is working on it")
         handle.seek(0)
         content = handle.read()
-        lines = _parsed(content, name)
+        lines, whole = _parsed(content, name)
         if (content and not lines) or (lines and kind is not None and lines[0].get("kind") != kind):
             raise InputError.single(name, "", "holds something else than results: expected another file, or none")
-        handle.truncate(content.rfind(b"\n") + 1)
+        if whole < len(content):
+            logging.getLogger("react_opt").warning(
+                "%s: its last line is broken, as a kill may leave it: it is cut off, and its job runs again", name
+            )
+            handle.truncate(whole)
         yield handle, lines
 
 
@@ -75,21 +85,37 @@ def _locked(handle: BinaryIO) -> bool:
 
 
 def append(handle: BinaryIO, line: Mapping[str, Any]) -> None:
-    """Append one line in one write, and see that it is on the disk."""
+    """Append one line in one write, and see that it is on the disk.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written, as on a full disk: what is there of the line is cut off at the next opening.
+    """
     data = json.dumps(line, allow_nan=False).encode() + b"\n"
-    while data:  # a full disk may take part of it, the rest of which is cut off when the file is opened again
-        data = data[handle.write(data) :]
-    os.fsync(handle.fileno())
+    try:
+        while data:
+            data = data[handle.write(data) :]
+        os.fsync(handle.fileno())
+    except OSError as error:
+        text = f"cannot be written: {error.strerror or error}; the same command goes on from here"
+        raise InputError.single(str(handle.name), "", text) from None
 
 
-def _parsed(content: bytes, name: str) -> list[dict[str, Any]]:
-    lines = []
-    for number, line in enumerate(content[: content.rfind(b"\n") + 1].splitlines(), start=1):
+def _parsed(content: bytes, name: str) -> tuple[list[dict[str, Any]], int]:
+    """Return the lines, and how many bytes they take; a last line that is no JSON, or lacks its end, is left out."""
+    lines: list[dict[str, Any]] = []
+    parts = content.split(b"\n")
+    whole = 0
+    for number, line in enumerate(parts[:-1], start=1):
         try:
             data = json.loads(line)
         except ValueError:
+            if lines and not b"".join(parts[number:]):
+                break
             data = None
         if not isinstance(data, dict):
             raise InputError.single(name, f"line {number}", "expected a JSON object")
         lines.append(data)
-    return lines
+        whole += len(line) + 1
+    return lines, whole

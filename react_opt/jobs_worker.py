@@ -146,5 +146,5 @@ def _answer(target: str, arguments: dict[str, Any]) -> tuple[bool, Any]:
         result = getattr(import_module(module), name)(**arguments)
         json.dumps(result, allow_nan=False)
     except Exception as error:  # whatever a job raises is its result; the next one is served all the same
-        return False, f"{type(error).__name__}: {error}"
+        return False, " ".join(f"{type(error).__name__}: {error}".split())
     return True, result

@@ -14,7 +14,7 @@ def double(number: int) -> dict[str, Any]:
 
 
 def fail() -> None:
-    raise ValueError("no luck")
+    raise ValueError("no luck\nat all")
 
 
 def unwritable() -> float:

@@ -42,7 +42,7 @@ def test_a_process_serves_as_many_jobs_as_it_may(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "limits", "ending", "word"),
     [
-        ("fail", {}, "failed", "ValueError: no luck"),
+        ("fail", {}, "failed", "ValueError: no luck at all"),
         ("unwritable", {}, "failed", "ValueError"),
         ("missing", {}, "failed", "AttributeError"),
         ("die", {}, "died", "code 7: a last word"),
@@ -72,6 +72,47 @@ def test_finished_jobs_do_not_run_again_and_half_a_line_is_cut_off(tmp_path: Pat
     assert [record.result for record in run_jobs(jobs, file)] == [0, 1, 2]
     assert log.read_text().split() == ["0", "1", "2"]
     assert [json.loads(line)["key"] for line in file.read_text().splitlines()] == ["n0", "n1", "n2"]
+
+
+@pytest.mark.parametrize("rest", ['{"key": "n1", "ending": "do\n', "\0\0\0\0", "\0\0\0\0\n", "\n"])
+def test_a_broken_last_line_is_announced_and_its_job_runs_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, rest: str
+) -> None:
+    file, log = tmp_path / "r.jsonl", tmp_path / "log"
+    jobs = [Job(f"n{k}", f"{HERE}:note", {"log": str(log), "number": k}) for k in range(2)]
+    run_jobs(jobs[:1], file)
+    with file.open("a") as handle:
+        handle.write(rest)
+    assert [record.result for record in run_jobs(jobs, file)] == [0, 1]
+    assert [record.message for record in caplog.records] == [
+        f"{file}: its last line is broken, as a kill may leave it: it is cut off, and its job runs again"
+    ]
+    assert log.read_text().split() == ["0", "1"]
+    assert [line["key"] for line in read_lines(file)] == ["n0", "n1"]
+
+
+def test_a_full_disk_is_one_line_and_the_run_goes_on_when_there_is_room(tmp_path: Path) -> None:
+    """No file of the process may grow beyond 300 bytes, which is one record and part of the next."""
+    file, log = tmp_path / "r.jsonl", tmp_path / "log"
+    script = f"""
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))
+from react_opt.errors import InputError
+from react_opt.jobs import Job, run_jobs
+jobs = [Job(f"n{{k}}", "job_targets:note", {{"log": {str(log)!r}, "number": k}}) for k in range(3)]
+try:
+    run_jobs(jobs, {str(file)!r})
+except InputError as error:
+    print(error)
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == f"{file}: cannot be written: File too large; the same command goes on from here\n"
+    assert done.stderr == ""
+    assert len(file.read_bytes()) == 300
+    jobs = [Job(f"n{k}", f"{HERE}:note", {"log": str(log), "number": k}) for k in range(3)]
+    assert [record.result for record in run_jobs(jobs, file)] == [0, 1, 2]
+    assert log.read_text().split().count("0") == 1
 
 
 def test_a_run_killed_in_the_middle_goes_on(tmp_path: Path) -> None:
@@ -122,6 +163,8 @@ def test_faults_are_named(tmp_path: Path) -> None:
         assert file.read_text() == other  # somebody else's file is left as it was
     with pytest.raises(InputError, match="cannot be written"):
         run_jobs([job], tmp_path / "no" / "r.jsonl")
+    with pytest.raises(InputError, match="expected a regular file"):
+        run_jobs([job], os.devnull)
 
 
 def test_without_ray_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

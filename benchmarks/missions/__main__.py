@@ -14,7 +14,6 @@ import argparse
 import hashlib
 import json
 import platform
-import subprocess
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -24,8 +23,10 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from benchmarks.families.factory import factory_map
 from benchmarks.missions.paper import RATED, Campaign, all_tables
 from benchmarks.missions.runs import RULES, Setting, limit_jobs, mission_jobs
+from benchmarks.runner import commit
 from react_opt.errors import ReactError
 from react_opt.instance import Fleet, Mission, canonical
 from react_opt.interrupt import Interruption
@@ -33,8 +34,7 @@ from react_opt.jobs import Job, Record, run_jobs
 from react_opt.jsonio import load, parse, write_text
 from react_opt.orchestrator.registry import strategy_names
 
-ROOT = Path(__file__).resolve().parents[2]
-FACTORY = ROOT / "examples" / "factory" / "mission_4.json"
+FACTORY = factory_map().with_name("mission_4.json")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -142,11 +142,8 @@ def _mission(options: argparse.Namespace) -> tuple[Mission, str]:
 
 def machine() -> dict[str, str]:
     """Return the commit, the package and the machine."""
-    done = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
     return {
-        "commit": done.stdout.strip() or "unknown",
+        "commit": commit() or "of a release",
         "react_opt": version("react_opt"),
         "python": platform.python_version(),
         "machine": f"{platform.machine()} {platform.system()}",

@@ -53,6 +53,15 @@ def test_made_up_solvers_are_exposed_and_honest_ones_are_not(finished: Path) -> 
     assert by["react_opt", "oros"]["memory_mb"] > 50
 
 
+def test_a_solver_that_breaks_is_named_with_its_fault_in_one_row_of_the_report(finished: Path) -> None:
+    rows = [line for line in (finished / "report.md").read_text().splitlines() if line.startswith("| ")]
+    (crash,) = [row for row in rows if "one line" in row]
+    assert crash.split(" | ", 2)[2].rstrip("| ") == "RuntimeError: one line and another \\| with a bar"
+    (other,) = [row for row in rows if "expected a plan" in row]
+    assert "the solver returned dict: expected a plan of kind assignment_plan" in other
+    assert f"--peer {Path(LIARS).name}" in (finished / "report.md").read_text()
+
+
 def test_where_it_was_run_is_recorded(finished: Path) -> None:
     (header,) = report.of_file(finished / "results.jsonl").headers
     assert header["machine"]["cores"] >= 1

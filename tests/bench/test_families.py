@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from benchmarks.families import FAMILIES
+from benchmarks.suites import SUITES
+from benchmarks.trial import instance_of
 from react_opt import jsonio
 
 FOLDER = Path(__file__).parents[2] / "benchmarks" / "families"
@@ -37,6 +40,20 @@ def test_every_size_is_valid_and_sizes_grow(name: str) -> None:
         counts.append(len(instance.cells if family.kind == "oros" else instance.targets))
     assert counts == sorted(counts)
     assert counts[0] <= 20
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_every_size_of_every_suite_is_valid_and_has_a_name_of_its_own(name: str) -> None:
+    """Files of ``--export``, and the rows of a report, are told apart by their names."""
+    cases = [dict(entry.case) for suite in SUITES.values() for entry in suite.entries if entry.case["family"] == name]
+    different = {json.dumps(case["parameters"], sort_keys=True): case for case in cases}
+    digests = {}
+    for case in different.values():  # one seed of each; that seeds differ is another test
+        instance = instance_of(case)
+        assert instance.kind == FAMILIES[name].kind
+        digests[instance.name] = jsonio.sha256(instance)
+    assert len(digests) == len(set(digests.values())) == len(different)
+    assert {json.dumps(size, sort_keys=True) for size in FAMILIES[name].sizes.values()} <= set(different)
 
 
 def test_there_are_instances_with_thousands_of_cells() -> None:
