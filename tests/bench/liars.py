@@ -41,13 +41,3 @@ def false_certificate(instance: Any, limits: Limits, tell: Tell) -> Any:
     plan = solve(instance, time_limit_s=limits.time_s, threads=1)
     prices = {**plan.claim.certificate, "cell_price": [0.0] * len(instance.cells)}
     return plan.model_copy(update={"claim": plan.claim.model_copy(update={"certificate": prices})})
-
-
-@peer("no_plan_at_all", ("assignment",), about="returns something else than a plan", package="react_opt")
-def no_plan_at_all(instance: Any, limits: Limits, tell: Tell) -> Any:
-    return {"assigned": []}
-
-
-@peer("crashes", ("assignment",), about="raises an error of two lines", package="react_opt")
-def crashes(instance: Any, limits: Limits, tell: Tell) -> Any:
-    raise RuntimeError("one line\nand another | with a bar")

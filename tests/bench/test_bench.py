@@ -21,7 +21,7 @@ from react_opt.errors import InputError, UsageError
 from react_opt.jobs_file import read_lines
 
 ROOT = Path(__file__).parents[2]
-LIARS = str(Path(__file__).with_name("liars.py"))
+LIARS, BREAKERS = (str(Path(__file__).with_name(name)) for name in ("liars.py", "breakers.py"))
 
 
 @pytest.fixture(scope="module")
@@ -53,13 +53,19 @@ def test_made_up_solvers_are_exposed_and_honest_ones_are_not(finished: Path) -> 
     assert by["react_opt", "oros"]["memory_mb"] > 50
 
 
-def test_a_solver_that_breaks_is_named_with_its_fault_in_one_row_of_the_report(finished: Path) -> None:
-    rows = [line for line in (finished / "report.md").read_text().splitlines() if line.startswith("| ")]
+def test_a_solver_that_breaks_is_named_with_its_fault_in_one_row_of_the_report(tmp_path: Path) -> None:
+    suite = Suite("trial", "", 2.0, tuple(of_family("conflicts", "tiny", [1], ())))
+    settings = runner.Settings(peer_files=(BREAKERS,), workers=2)
+    jobs = runner.jobs_of(suite, settings)
+    runner.run(suite, settings, str(tmp_path / "r.jsonl"), jobs)
+    report.write(tmp_path / "r.jsonl", str(tmp_path / "r.md"))
+    text = (tmp_path / "r.md").read_text()
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
     (crash,) = [row for row in rows if "one line" in row]
     assert crash.split(" | ", 2)[2].rstrip("| ") == "RuntimeError: one line and another \\| with a bar"
     (other,) = [row for row in rows if "expected a plan" in row]
     assert "the solver returned dict: expected a plan of kind assignment_plan" in other
-    assert f"--peer {Path(LIARS).name}" in (finished / "report.md").read_text()
+    assert f"react-opt bench trial --workers 2 --peer {Path(BREAKERS).name} -o" in text
 
 
 def test_where_it_was_run_is_recorded(finished: Path) -> None:
