@@ -44,7 +44,8 @@ def inspect(
     arrays
         The problem (:func:`react_opt.models.inspection.build`).
     options
-        Limits, threads, seed and gap. The unit of ``work_limit`` is one pricing or one portion of local search.
+        Limits, threads, seed and gap. The unit of ``work_limit`` is one pricing (a large one is several) or one
+        portion of local search.
     routes
         Feasible routes to start from; None for none.
     reserve_s

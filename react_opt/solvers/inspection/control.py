@@ -12,6 +12,8 @@ import numpy as np
 from react_opt.solvers.outcome import Limit
 
 POLL_S = 0.01
+LABELS = 2000
+"""Labels of a pricing that are one unit of work more: enumerations make so many that pricings alone would not count."""
 
 
 class Control:
@@ -22,7 +24,8 @@ class Control:
     deadline
         ``time.perf_counter()`` at which to stop; None for none.
     work_limit
-        Pricings and portions of local search at most; None for none.
+        Work at most: pricings, with one more for every :data:`LABELS` labels, and portions of local search; None for
+        no limit.
     should_stop
         Polled from another thread; True stops. None for never.
 
@@ -68,6 +71,14 @@ class Control:
         if self.limit in ("time", "interrupt"):
             self.flag[0] = 1
         return self.limit != "none"
+
+    def affordable(self, labels: int) -> int:
+        """Return how many labels the next pricing may make: so many, or as many as the work left allows."""
+        return labels if self.work_limit is None else min(labels, max(1, self.work_limit - self.work) * LABELS)
+
+    def count(self, labels: int) -> None:
+        """Count the work of a pricing that made so many labels."""
+        self.work += 1 + labels // LABELS
 
     def part(self) -> Control:
         """Return a control for a part of the work that shares the deadline; the kernels read a flag of their own."""

@@ -273,8 +273,8 @@ class Decomposition:
         """Price heuristically; True where routes were found. Bounds by the completion tables on the way."""
         added, bounds = 0, []
         for pricer, least in zip(self.pricers, threshold, strict=True):
-            self.control.work += 1
             found = pricer.price(prize, rate, least, HEURISTIC, HEURISTIC_LABELS, self.columns, self.control.flag)
+            self.control.count(found.labels)
             added += self.master.add(found.columns)
             bounds.append(found.bound)
         if duals.stand_in < 1e-6 and np.isfinite(bounds).all():
@@ -287,8 +287,9 @@ class Decomposition:
         """Return the largest profits and the number of new columns, None where labels or time ran out."""
         best, added, whole = [], 0, True
         for pricer, least in zip(self.pricers, threshold, strict=True):
-            self.control.work += 1
-            found = pricer.price(prize, rate, least, EXACT, EXACT_LABELS, self.columns, self.control.flag, cuts)
+            most = self.control.affordable(EXACT_LABELS)
+            found = pricer.price(prize, rate, least, EXACT, most, self.columns, self.control.flag, cuts)
+            self.control.count(found.labels)
             added += self.master.add(found.columns)
             if found.best is None:
                 whole = False
@@ -349,10 +350,9 @@ class Decomposition:
         columns: list[Column] = []
         whole, cuts = True, self._cuts(duals)
         for pricer, price in zip(self.pricers, duals.group.tolist(), strict=True):
-            self.control.work += 1
-            found = pricer.price(
-                prize, rate, -price - gap, ENUMERATE, most_labels, most_columns, self.control.flag, cuts
-            )
+            most = self.control.affordable(most_labels)
+            found = pricer.price(prize, rate, -price - gap, ENUMERATE, most, most_columns, self.control.flag, cuts)
+            self.control.count(found.labels)
             whole = whole and found.best is not None and len(found.columns) < most_columns
             columns += found.columns
             if not whole and not last:
