@@ -45,6 +45,7 @@ KEEP_S = 2.0  # turning away from a target that is already approached costs abou
 MOVED_M = 1.0  # a goal that moves further calls for a new way
 SEEN_M = 0.5  # a target that is still unknown from here will stay so
 ASSIGN_WORK = 2000
+TRIES = 8
 
 
 @dataclass
@@ -92,21 +93,29 @@ class React:
             self.state.setdefault(robot.id, RobotState())
         self.targets = self.local.find(belief, self.survey, robots, self.looked)
         self._abandon(robots, notes)
-        open_targets = self._targets(belief, robots, notes)  # line 4
-        costs = {robot.id: self._costs(belief, robot, open_targets) for robot in robots}
         changed = bool(lost) or not self.begun
-        for area in belief.areas:
-            changed |= self._close_area(area, robots, open_targets, costs, notes)  # lines 7 and 8
-        if changed:
-            self.begun = True
-            self._call_oros(belief, robots, areas, open_targets, costs, notes)  # lines 1 and 8
-        active = [robot for robot in robots if self.state[robot.id].area is not None]
-        if not active:  # line 9
-            return self._inspect(belief, robots, notes)  # line 10
-        self.inspection = None
-        chosen = self._assign(active, open_targets, costs, notes)  # line 5
-        orders = [order for robot in robots for order in self._move(belief, robot, areas, chosen)]  # line 6
-        return Decision(orders, notes)
+        orders: list[Order] = []
+        for _ in range(TRIES):  # a goal without a way is given up, and all is decided anew without it
+            open_targets = self._targets(belief, robots, notes)  # line 4
+            costs = {robot.id: self._costs(belief, robot, open_targets) for robot in robots}
+            for area in belief.areas:
+                changed |= self._close_area(area, robots, open_targets, costs, notes)  # lines 7 and 8
+            if changed:
+                self.begun = True
+                self._call_oros(belief, robots, areas, open_targets, costs, notes)  # lines 1 and 8
+            active = [robot for robot in robots if self.state[robot.id].area is not None]
+            if not active:  # line 9
+                return self._inspect(belief, robots, notes)  # line 10
+            self.inspection = None
+            chosen = self._assign(active, open_targets, costs, notes)  # line 5
+            answers = {robot.id: self._move(belief, robot, areas, chosen, notes) for robot in robots}  # line 6
+            orders += [order for answer in answers.values() for order in answer or ()]
+            lost_way = [robot for robot in robots if answers[robot.id] is None]
+            if not lost_way:
+                break
+            orders += [order for robot in lost_way for order in self.driver.stop(robot)]
+            changed = False
+        return Decision(_latest(orders), notes)
 
     # --- targets ---
 
@@ -290,9 +299,17 @@ class React:
         return chosen
 
     def _move(
-        self, belief: Belief, robot: RobotView, areas: dict[str, AreaView], chosen: dict[str, LocalTarget]
-    ) -> list[Order]:
-        """Send a robot to its local target, or to its area while it has none (line 6)."""
+        self,
+        belief: Belief,
+        robot: RobotView,
+        areas: dict[str, AreaView],
+        chosen: dict[str, LocalTarget],
+        notes: list[Note],
+    ) -> list[Order] | None:
+        """Send a robot to its local target, or to its area while it has none (line 6).
+
+        None where there is no way: the target is abandoned; an area counts as entered, for the robot gets no nearer.
+        """
         assert self.survey is not None
         state = self.state[robot.id]
         if state.area is None:
@@ -304,10 +321,15 @@ class React:
         else:
             state.goal, goal_m = state.area, goal_of(self.survey.map, areas[state.area])
         orders = self.driver.go(belief, self.survey, robot, goal_m, state.goal)
-        if orders is None:
-            state.entered |= state.goal == state.area  # it gets no nearer
-            return self.driver.stop(robot)
-        return orders
+        if orders is not None:
+            return orders
+        if target is not None:
+            notes.append(Note("target_abandoned", robot=robot.id, target=target.id, reason="no way"))
+            self.abandoned[target.id] = target.stand_m
+        elif state.entered:
+            return self.driver.stop(robot)  # it waits for the targets of its area that others are assigned to
+        state.entered |= target is None
+        return None
 
     # --- the deferred-priority inspection ---
 
@@ -317,3 +339,8 @@ class React:
         assert self.survey is not None
         orders, done = self.inspection.step(belief, self.survey, robots, self.targets, self.looked, notes)
         return Decision(orders, notes, done)
+
+
+def _latest(orders: list[Order]) -> list[Order]:
+    """Return the last order of each robot."""
+    return list({order.robot: order for order in orders}.values())

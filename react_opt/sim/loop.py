@@ -2,7 +2,8 @@
 
 Simulated time advances in ticks of :data:`TICK_S`. Robots scan every :data:`SCAN_S` while their sensors are on;
 their maps reach the belief as the link allows; the strategy decides every :data:`DECIDE_S` if the map has changed,
-and at once when a robot arrives, gets stuck or dies. Nothing depends on the machine's clock.
+and at once when a robot arrives, gets stuck or dies; a robot that it leaves standing is a reason to ask again every few
+seconds. Nothing depends on the machine's clock.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from react_opt.trace import Trace
 TICK_S = 0.125
 SCAN_S = 0.25
 DECIDE_S = 1.0
+_WAIT_S = 5.0  # a strategy that leaves a robot standing is asked again after so long: what it gave up may be tried anew
 RULES_S = 0.25
 REPLAN_S = 0.5
 _LOOK_M = 4.0  # so far ahead a robot looks whether its way is still open
@@ -198,7 +200,10 @@ class Simulation:
         last_s, version = self._decided
         if self.belief.version == 0:
             return False  # no map has arrived yet
-        return self._news or (self.t_s >= last_s + DECIDE_S and version != self.belief.version)
+        if self._news or (self.t_s >= last_s + DECIDE_S and version != self.belief.version):
+            return True
+        waits = not self._done and any(robot.state == "idle" for robot in self.robots)
+        return waits and self.t_s >= last_s + _WAIT_S
 
     def _decide(self) -> None:
         """Report the robots to the belief, ask the strategy and hand out its orders."""

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from react_opt.orchestrator.belief import RobotView
 from react_opt.orchestrator.highlevel import Place, direct_pairs, high_level
 from react_opt.orchestrator.registry import make_strategy
-from react_opt.orchestrator.strategy import StrategyOptions
+from react_opt.orchestrator.strategy import Point, StrategyOptions
 
 from .drawn import DrawnBelief, Loop, drawn, robot_at
 
@@ -97,3 +98,23 @@ def test_a_busy_robot_starts_where_it_is_going_and_when_it_is_there() -> None:
     assert plan.routes["a"] == ("2,0",), "it explores 1,0 where it starts, after three steps of 5 s, and goes on"
     late = high_level(belief, belief.survey(), OPTIONS, [Place(robot, "1,0", busy_s=299.0)], frozenset({"0,0"}))
     assert set(late.explored_by) <= {"1,0"}
+
+
+class Walled(DrawnBelief):
+    """A belief in which nothing leads into the area in the middle, though nothing proves it."""
+
+    def path(self, robot: RobotView, goal_m: Point, *, optimistic: bool = False) -> tuple[Point, ...]:
+        return () if 10.0 < goal_m[0] < 20.0 else super().path(robot, goal_m, optimistic=optimistic)
+
+
+def test_an_area_without_a_way_is_passed_over_at_once() -> None:
+    """A robot that stood and waited would see nothing new, and nobody would ask again."""
+    cells = np.full((60, 300), 2, dtype=np.uint8)
+    cells[0:60, 0:100] = 0
+    belief = Walled(cells, (robot_at("a", 2.0, 3.0),), area_m=10.0)
+    decision = make_strategy("react", replace(OPTIONS, postpone_below=10.0)).decide(belief)
+    last = {order.robot: order for order in decision.orders}["a"]
+    assert last.target == "2,0"
+    assert last.path_m
+    passed = [note.target for note in decision.notes if note.type == "area_explored" and note.robot == "a"]
+    assert passed[-1:] == ["1,0"]

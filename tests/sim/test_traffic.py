@@ -128,3 +128,34 @@ def test_a_robot_that_cannot_turn_works_itself_free() -> None:
         seen.append(clearance_px(clearance, robot.u_m / unit, robot.v_m / unit))
     assert seen[0] < robot.profile.radius_m
     assert max(seen) >= robot.profile.radius_m
+
+
+NARROW = building([(2.0, 0.0, 6.0, 1.6), (2.0, 2.3, 6.0, 4.0)], (8.0, 4.0))
+"""A corridor of 0.7 m: a robot of 0.67 m across has 1.7 cm to spare where it turns."""
+
+
+def test_a_robot_that_waits_in_a_narrow_place_is_not_wedged() -> None:
+    """It stands along the corridor and waits before it drives on; working itself free would lead it back or turn it."""
+    simulation = Simulation(mission([(1.0, 1.95)]), NARROW)
+    (robot,) = simulation.robots
+    robot.u_m, robot.v_m, robot.heading_rad, robot.state, robot.wait_s = 2.05, 1.93, 0.0, "driving", 2.0
+    robot.follow([(7.0, 1.95)])
+    for _ in range(8):
+        simulation.traffic.move(TICK_S)
+        assert (robot.u_m, robot.v_m, robot.heading_rad, robot.wedged) == (2.05, 1.93, 0.0, False)
+
+
+@pytest.mark.parametrize("heading", [-0.9, -0.5, -0.25, 0.25, 0.5, 0.9, 2.2, 2.6, -2.2, -2.6])
+def test_a_robot_at_a_slant_in_a_narrow_place_gets_out(heading: float) -> None:
+    """Nearer to one wall than turning takes: it must not swing to and fro between two headings for ever."""
+    simulation = Simulation(mission([(1.0, 1.95)]), NARROW)
+    (robot,) = simulation.robots
+    traffic = simulation.traffic
+    for v in (1.93, 1.95, 1.97):
+        if not traffic._free(robot, 4.0, v, heading):
+            continue
+        robot.u_m, robot.v_m, robot.heading_rad, robot.state, robot.wedged = 4.0, v, heading, "driving", False
+        robot.follow([(7.0, 1.95)])
+        for _ in range(round(60.0 / TICK_S)):
+            traffic.move(TICK_S)
+        assert robot.u_m > 6.5
