@@ -14,6 +14,9 @@ of the first entries, take at least the sum of the least times from set to set. 
 of :mod:`react_opt.limits.reach`, so they hold for every continuous path. The least T over all 2^k sets S and all ways
 to share them, found exactly by dynamic programming (Held and Karp 1962), is the bound. It holds for any choice of the
 N_i; which ones are taken is a search for a strong bound, and no part of the proof.
+
+**Both joined** (:mod:`react_opt.limits.detours`). A robot that has entered some of the N_i by T has seen nothing by T
+but what is visible from places that it can have come by on top of that.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
+from react_opt.limits.detours import Detours, seen_from_blocks
 from react_opt.limits.hidden import Hidden
 
 FloatArray = NDArray[np.float64]
@@ -79,12 +83,15 @@ class Regions:
         ``(robots, n)`` least time from each start, s.
     between_s
         ``(n, n)`` least time from region to region, s.
+    block_s
+        ``(n, blocks)`` least time from each region to each block of places (:meth:`Hidden.blocks`), s.
     """
 
     inside: NDArray[np.bool_]
     weight: IntArray
     start_s: FloatArray
     between_s: FloatArray
+    block_s: FloatArray
 
 
 def candidates(hidden: Hidden, shares: Sequence[float] = GROWTH) -> Regions:
@@ -106,11 +113,12 @@ def candidates(hidden: Hidden, shares: Sequence[float] = GROWTH) -> Regions:
     for g in np.argsort(sizes, kind="stable"):
         if taken[g]:
             continue
-        taken |= 1.25 * np.bitwise_count(seen & seen[g]).sum(axis=1) >= np.minimum(sizes, sizes[g])
+        common = np.bitwise_count(seen & seen[g]).sum(axis=1).astype(np.int64)
+        taken |= 1.25 * common >= np.minimum(sizes, sizes[g])
+        outside = sizes - common
         for most_outside in shares:
-            outside = np.bitwise_count(seen & ~seen[g]).sum(axis=1)
             region = np.bitwise_or.reduce(seen[outside <= most_outside * sizes], axis=0)
-            within = np.bitwise_count(seen & ~region).sum(axis=1) == 0
+            within = ~(seen & ~region).any(axis=1)
             new = not any(np.array_equal(within, other) for other in inside)
             if new and weight[within].sum() >= LEAST_WEIGHT * weight.sum():
                 regions.append(region)
@@ -118,11 +126,25 @@ def candidates(hidden: Hidden, shares: Sequence[float] = GROWTH) -> Regions:
     masks = [(row[bits >> 6] >> (bits & 63).astype(np.uint64) & np.uint64(1)).astype(np.bool_) for row in regions]
     start = np.array([[field[mask].min() for mask in masks] for field in hidden.starts_s])
     between = np.zeros((len(masks), len(masks)))
+    block, count = hidden.blocks()
+    block_s = np.full((len(masks), count), np.inf)
     for i, mask in enumerate(masks):
         least = hidden.place_reach_s(mask)
         between[i] = [least[other].min() for other in masks]
+        np.minimum.at(block_s[i], block, least)
     groups = np.array(inside).reshape(-1, len(sizes))
-    return Regions(groups, groups @ weight, start, np.maximum(between, between.T))  # paths lead both ways
+    start = start.reshape(-1, len(masks))
+    return Regions(groups, groups @ weight, start, np.maximum(between, between.T), block_s)  # paths lead both ways
+
+
+def detours(hidden: Hidden, regions: Regions) -> Detours:
+    """Return what the joined bound needs (:mod:`react_opt.limits.detours`)."""
+    block, count = hidden.blocks()
+    start = np.full((len(hidden.starts_s), count), np.inf)
+    for r, least in enumerate(hidden.starts_s):
+        np.minimum.at(start[r], block, least)
+    begin, lists = seen_from_blocks(hidden.seen_from, block, count)
+    return Detours(hidden, begin, lists, start, regions.inside, regions.start_s, regions.between_s, regions.block_s)
 
 
 def time_bound(hidden: Hidden, regions: Regions, share: float, robots: int) -> Bound:
@@ -161,6 +183,9 @@ def time_bound(hidden: Hidden, regions: Regions, share: float, robots: int) -> B
         bound = float(worth(kept[:size], robots)[0])
         if bound > found:
             found, used = bound, size
+    joined, size = detours(hidden, regions).strongest(share, robots, kept)
+    if joined > found:
+        found, used = joined, size
     return Bound(share, robots, found, simple, used)
 
 

@@ -31,6 +31,8 @@ TILE_M = 0.1
 
 MOST_TILES = 250_000
 GROUP_M = 0.3
+BLOCK_M = 0.5
+"""Side of the squares in which places are taken together where detours are counted, m."""
 MOST_GROUPS = 8000
 
 
@@ -62,6 +64,8 @@ class Hidden:
     seen_from: NDArray[np.uint64]
     starts_s: FloatArray
     """``(robots, places)`` least time from each robot's start, s."""
+    tile_m: float
+    """Side of a tile, m."""
 
     @property
     def total(self) -> int:
@@ -72,6 +76,13 @@ class Hidden:
     def group_weight(self) -> IntArray:
         """``(groups,)`` coverable pixels of each group."""
         return np.bincount(self.group, self.weight, len(self.seen_from)).astype(np.int64)
+
+    def blocks(self) -> tuple[IntArray, int]:
+        """Return ``(places,)`` the square of places that each one belongs to, and how many there are."""
+        rows, cols = np.nonzero(self.places >= 0)
+        side = max(1, round(BLOCK_M / self.tile_m))
+        _, block = np.unique(rows // side * self.places.shape[1] + cols // side, return_inverse=True)
+        return block.astype(np.int64), int(block.max()) + 1
 
     def group_earliest_s(self, robots: int) -> FloatArray:
         """Return ``(groups,)`` when any tile of a group can be seen by the first robots at the earliest, s."""
@@ -124,7 +135,7 @@ def survey(world: World, profiles: Sequence[RobotProfile], starts_m: FloatArray)
     earliest = np.full((len(starts), len(rows)), np.inf)
     reach = max(p.lidar_range_m for p in profiles) / (side * unit)
     _look(np.ascontiguousarray(opaque), places, rows, cols, group, reach, memory(), starts, seen_from, earliest)
-    return Hidden(step, places, weight[rows, cols], earliest, group, seen_from, starts)
+    return Hidden(step, places, weight[rows, cols], earliest, group, seen_from, starts, side * unit)
 
 
 def _tiles(pixels: NDArray[np.generic], side: int, of: object, beyond: int) -> NDArray[np.generic]:

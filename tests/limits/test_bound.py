@@ -11,7 +11,7 @@ import pytest
 from react_opt.energy import RobotProfile
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.geometry.raycast import ray_table, scan_px
-from react_opt.limits.bound import candidates, time_bound
+from react_opt.limits.bound import candidates, detours, reachability_s, time_bound
 from react_opt.limits.hidden import survey
 from react_opt.sim.world import World
 
@@ -79,6 +79,38 @@ def test_no_plan_is_faster(drawing: str, starts: list[tuple[float, float]], shar
     hidden = survey(world, [ROBOT] * len(starts), np.array(starts))
     bound = time_bound(hidden, candidates(hidden), share, len(starts))
     assert bound.reachability_s <= bound.time_s <= best_time(world, starts, share)
+
+
+@pytest.mark.parametrize("share", [0.8, 0.95])
+@pytest.mark.parametrize(
+    ("drawing", "starts"),
+    [(COMB, [(9.5, 1.5)]), (CROSS, [(4.5, 3.5)]), (CROSS, [(4.5, 3.5), (3.5, 3.5)])],
+    ids=["comb", "cross", "cross of two"],
+)
+def test_with_detours_no_plan_is_faster_whatever_regions_are_counted(
+    drawing: str, starts: list[tuple[float, float]], share: float
+) -> None:
+    world = world_of(drawing, starts)
+    hidden = survey(world, [ROBOT] * len(starts), np.array(starts))
+    regions = candidates(hidden)
+    joined = detours(hidden, regions)
+    best, needed = best_time(world, starts, share), int(np.ceil(share * hidden.total - 1e-9))
+    rng = np.random.default_rng(0)
+    for size in (0, 1, 2, 3, 3, 4):
+        family = rng.permutation(len(regions.weight))[:size].tolist()
+        assert joined.bounds_s(family, len(starts), [needed])[0] <= best
+    assert joined.strongest(share, len(starts), [])[0] <= best
+
+
+def test_one_region_that_must_be_entered_tells_of_all_that_lies_elsewhere() -> None:
+    """A robot that must enter a dead end on one side of its start sees the other side before it or after it."""
+    starts = [(9.5, 1.5)]
+    world = world_of(COMB, starts)
+    hidden = survey(world, [ROBOT], np.array(starts))
+    joined, needed = detours(hidden, candidates(hidden)), [int(np.ceil(0.97 * hidden.total))]
+    simple = reachability_s(hidden, 0.97, 1)
+    assert joined.bounds_s([], 1, needed)[0] <= simple + 1e-9  # places are taken together: it can only be less
+    assert max(joined.bounds_s([n], 1, needed)[0] for n in range(len(joined.inside))) > 1.5 * simple
 
 
 def test_the_dead_ends_of_a_comb_must_be_visited() -> None:
