@@ -33,8 +33,8 @@ def grow_sets(
     graph: Graph,
     prices: Prices,
     fuel: Fuel,
-    start_cell: int,
-    start_time: int,
+    origin: FloatArray,
+    idle_end: FloatArray,
     completion: FloatArray,
     other: Labels,
     cutoff: float,
@@ -42,6 +42,10 @@ def grow_sets(
     stop: NDArray[np.uint8],
 ) -> tuple[Labels, MaskArray, FloatArray, bool]:
     """Return one label per cell, instant and exact set of cells that may end at ``cutoff`` or more.
+
+    A label that has just collected a cell (or the first of all) may be the last of its route that collects anything;
+    ``idle_end`` is ``(H + 1, n)`` what it is worth to end from there on. All others have to collect something more, so
+    ``completion`` and ``other`` speak of rests of routes that collect something.
 
     The value of a label leaves out the prices of cuts that it has paid; they are kept apart because labels with
     the same set compare by what they are worth in the plan. The second result is ``(n_labels, n_words)`` the
@@ -83,28 +87,30 @@ def grow_sets(
             start[node] = count
             if stop[0] != 0:
                 complete = False
-            if not complete or tau < start_time or completion[0, tau, j] <= NEVER:
+            if not complete:
                 continue
             mirrored = (last - tau) * n + j
             gain = prices.gain[tau, j]
             bit = graph.bit[j]
             word, inside = j // 64, _ONE << np.uint64(j % 64)
             cut_of, cut_keep = prices.cut_of[j], prices.cut_keep[j]
+            rest = completion[0, tau, j]
             least = fuel.least[tau, j] if limited else 0.0
             found = 0
-            for a in range(graph.in_start[j] - 1, graph.in_start[j + 1]):
-                waits = a < graph.in_start[j]
-                if tau == start_time:
-                    if not waits or j != start_cell:
+            for a in range(graph.in_start[j] - 2, graph.in_start[j + 1]):
+                if a == graph.in_start[j] - 2:
+                    if origin[tau, j] <= NEVER:
                         continue
                     first, beyond = 0, 1
                     keep, cost, burn, taken = _ZERO, 0.0, 0.0, ORIGIN
                 else:
-                    if waits:
+                    if a < graph.in_start[j]:
+                        if tau == 0:
+                            continue
                         before = (tau - 1) * n + j
                         keep, cost, burn, taken = ~_ZERO, prices.wait_cost, fuel.wait, WAIT
                     else:
-                        if tau - graph.in_steps[a] < start_time:
+                        if tau < graph.in_steps[a]:
                             continue
                         before = (tau - graph.in_steps[a]) * n + graph.in_from[a]
                         taken = graph.in_arc[a]
@@ -130,21 +136,18 @@ def grow_sets(
                             m |= bit
                             s ^= cut_of
                             f += fuel.sense
-                        # a label before collecting is completed with collecting here, one after it without
-                        here = max(gain, 0.0) if collects else 0.0
-                        if v - p + completion[0, tau, j] - here < cutoff:
+                        # before collecting a label is completed with collecting here, afterwards without
+                        more = v - p + rest - (max(gain, 0.0) if collects else 0.0)
+                        done = v - p + idle_end[tau, j] if collects or taken == ORIGIN else NEVER
+                        if max(more, done) < cutoff or (limited and f + least > fuel.budget):
                             break
-                        if limited and (
-                            f + least > fuel.budget
-                            or (not collects and at_most(v - p, f, fuel, completion, tau, j) < cutoff)
-                        ):
-                            break
-                        if (
-                            joined
-                            and collects == 0
-                            and not completed(v - p, m, s, f, mirrored, other, prices.cut_price, fuel.budget, cutoff)
-                        ):
-                            break
+                        if collects == 0 and taken != ORIGIN:
+                            if limited and at_most(v - p, f, fuel, completion, tau, j) < cutoff:
+                                break
+                            if joined and not completed(
+                                v - p, m, s, f, mirrored, other, prices.cut_price, fuel.budget, cutoff
+                            ):
+                                break
                         if found == room:
                             room *= 2
                             c_value = np.concatenate((c_value, np.empty(found)))
@@ -247,8 +250,8 @@ class Enumerated:
     ----------
     labels
         All labels of the enumeration.
-    label, cell
-        ``(m,)`` the last label of each route and the cell in which it ends.
+    label
+        ``(m,)`` the last label of each route that collects anything.
     reduced
         ``(m,)`` value minus prices, the group's multiplier not deducted.
     value
@@ -259,7 +262,6 @@ class Enumerated:
 
     labels: Labels
     label: IntArray
-    cell: IntArray
     reduced: FloatArray
     value: FloatArray
     sets: MaskArray
@@ -292,16 +294,16 @@ def enumerate_routes(
     max_labels
         Limit beyond which the enumeration is given up.
     """
-    ahead, fuel, bound, behind, cutoff = pricer.completions(group, duals, floor, side, cuts)
+    ahead, fuel, bound, behind, cutoff = pricer.endings(group, duals, floor, side, cuts)
     if behind is None:
         return None
-    data, n = pricer.problem.classes[group], pricer.problem.n_cells
+    idle_end = pricer.rests.last[group][::-1]
     labels, sets, paid, complete = grow_sets(
         pricer.forward,
         ahead,
         fuel,
-        data.start,
-        data.start_step,
+        pricer.rests.begin[group],
+        idle_end,
         bound,
         behind,
         cutoff,
@@ -310,21 +312,19 @@ def enumerate_routes(
     )
     if not complete:
         return None
-    first = int(labels.start[pricer.problem.horizon * n])
-    chosen = _best_per_set(labels.value[first:], sets[first:], pricer.allowed_end(group, labels))
-    label = first + chosen
-    cell = np.searchsorted(labels.start[pricer.problem.horizon * n :], label, side="right") - 1
+    node = np.repeat(np.arange(len(labels.start) - 1), np.diff(labels.start))
+    value = labels.value + idle_end.ravel()[node]
+    label = np.flatnonzero((labels.sensed | (labels.arc == ORIGIN)) & (value - paid >= cutoff))
+    label = label[_best_per_set(value[label], sets[label])]
     constant = floor - cutoff
-    held = sets[label]
-    inside = np.unpackbits(held.view(np.uint8), axis=1, bitorder="little")[:, :n]
-    value = labels.value[label] + constant
-    return Enumerated(labels, label, cell, value - paid[label], value + inside @ duals.cell, held)
+    inside = np.unpackbits(sets[label].view(np.uint8), axis=1, bitorder="little")[:, : pricer.problem.n_cells]
+    worth = value[label] + constant
+    return Enumerated(labels, label, worth - paid[label], worth + inside @ duals.cell, sets[label])
 
 
-def _best_per_set(value: FloatArray, sets: MaskArray, allowed: NDArray[np.bool_]) -> IntArray:
-    """Return the index of the best allowed label of each distinct set."""
-    index = np.flatnonzero(allowed)
-    order = index[np.argsort(-value[index], kind="stable")]
+def _best_per_set(value: FloatArray, sets: MaskArray) -> IntArray:
+    """Return the index of the best label of each distinct set."""
+    order = np.argsort(-value, kind="stable")
     if len(order) == 0:
         return order.astype(np.int64)
     _, first = np.unique(sets[order], axis=0, return_index=True)

@@ -11,8 +11,8 @@ from react_opt.solvers.routes.enumeration import Enumerated, enumerate_routes
 from react_opt.solvers.routes.generation import Generation, Multipliers
 
 EASIER = 0.7  # share of the last hopeless gap at which it is tried again
-LEAST_LABELS, MOST_LABELS = 300_000, 5_000_000  # of the enumeration of one class
-LABELS_PER_LABEL = 200  # in between: as many times the labels of one pricing
+LEAST_LABELS, MOST_LABELS = 1_000_000, 8_000_000  # of the enumeration of one class
+LABELS_PER_LABEL = 3  # in between: as many times the labels of all pricings so far, which are dearer
 MOST_ROUTES = 200_000
 MOST_WORK = 1_000_000_000  # looks at routes when choosing among them, about a second
 
@@ -58,7 +58,7 @@ class Finish:
         if gap > self._hopeless_gap and not anew:
             return None
         pricer, floor = self.generation.pricer, standing.objective
-        most_labels = min(MOST_LABELS, max(LEAST_LABELS, LABELS_PER_LABEL * pricer.labels // max(1, pricer.calls)))
+        most_labels = min(MOST_LABELS, max(LEAST_LABELS, LABELS_PER_LABEL * pricer.labels))
         duals = self.generation.extended(best)
         found: list[Enumerated] = []
         for group in range(len(master.counts)):
@@ -108,7 +108,7 @@ class Finish:
         if best[0] >= 0:
             within = np.concatenate([np.arange(len(one.label)) for one in found])[order]
             columns = [
-                pricer.column(k, found[k].labels, int(found[k].label[r]), int(found[k].cell[r]))
+                pricer.column(k, found[k].labels, int(found[k].label[r]))
                 for k, r in zip(group[order][best].tolist(), within[best].tolist(), strict=True)
             ]
             columns.sort(key=lambda column: column.group)

@@ -40,7 +40,7 @@ def lowest_bit(word: np.uint64) -> int:
 
 
 @kernel(nogil=True)
-def flat_values(graph: Graph, prices: Prices, origin: FloatArray, origin_time: int, collect: bool) -> FloatArray:
+def flat_values(graph: Graph, prices: Prices, origin: FloatArray, collect: bool, collects_first: bool) -> FloatArray:
     """Return the value of the best way to each cell and instant when nothing is remembered.
 
     ``(H + 1, n)``, collecting at tau included; ``NEVER`` where the cell cannot be reached. It bounds every
@@ -50,35 +50,36 @@ def flat_values(graph: Graph, prices: Prices, origin: FloatArray, origin_time: i
     ----------
     graph, prices
         Arcs and prices in kernel time; cuts are ignored.
-    origin, origin_time
-        Value of starting in each cell, at this instant.
+    origin
+        ``(H + 1, n)`` value of starting in each cell at each instant, ``NEVER`` where no route starts.
     collect
         False leaves out the gains.
+    collects_first
+        Every route collects the cell in which it starts at once.
     """
     n = len(graph.in_start) - 1
     last = len(prices.gain) - 1
     priced = len(prices.stand) > 1
     best = np.full((last + 1, n), NEVER)
-    for tau in range(origin_time, last + 1):
+    for tau in range(last + 1):
         for j in range(n):
-            value = NEVER
-            if tau == origin_time:
-                value = origin[j]
-            else:
-                if best[tau - 1, j] > NEVER:
-                    value = best[tau - 1, j] - prices.wait_cost
-                for a in range(graph.in_start[j], graph.in_start[j + 1]):
-                    before = tau - graph.in_steps[a]
-                    if before >= origin_time and best[before, graph.in_from[a]] > NEVER:
-                        value = max(value, best[before, graph.in_from[a]] - prices.arc_cost[graph.in_arc[a]])
-            if value > NEVER:
-                if priced and prices.stand[tau, j] == np.inf:
+            value = NEVER if collects_first else origin[tau, j]
+            if tau > 0 and best[tau - 1, j] > NEVER:
+                value = max(value, best[tau - 1, j] - prices.wait_cost)
+            for a in range(graph.in_start[j], graph.in_start[j + 1]):
+                before = tau - graph.in_steps[a]
+                if before >= 0 and best[before, graph.in_from[a]] > NEVER:
+                    value = max(value, best[before, graph.in_from[a]] - prices.arc_cost[graph.in_arc[a]])
+            gain = prices.gain[tau, j]
+            if value > NEVER and collect and gain > 0.0:
+                value += gain
+            if collects_first and origin[tau, j] > NEVER and gain > NEVER:
+                value = max(value, origin[tau, j] + gain)
+            if value > NEVER and priced:
+                if prices.stand[tau, j] == np.inf:
                     continue
-                if priced:
-                    value -= prices.stand[tau, j]
-                if collect and prices.gain[tau, j] > 0.0:
-                    value += prices.gain[tau, j]
-                best[tau, j] = value
+                value -= prices.stand[tau, j]
+            best[tau, j] = value
     return best
 
 
@@ -125,7 +126,7 @@ def grow_labels(
     prices: Prices,
     fuel: Fuel,
     origin: FloatArray,
-    origin_time: int,
+    collects_first: bool,
     completion: FloatArray,
     other: Labels,
     cutoff: float,
@@ -140,8 +141,10 @@ def grow_labels(
     ----------
     graph, prices, fuel
         Arcs, prices and battery in kernel time.
-    origin, origin_time
-        Value of starting in each cell (``NEVER`` where no route starts), at this instant.
+    origin
+        ``(H + 1, n)`` value of starting in each cell at each instant, ``NEVER`` where no route starts.
+    collects_first
+        Every route collects the cell in which it starts at once.
     completion
         ``(n_rates, H + 1, n)`` bound on what the rest of the route earns from here, collecting here included,
         when each joule of it costs ``fuel.rate``.
@@ -193,7 +196,7 @@ def grow_labels(
             if stop[0] != 0:
                 complete = False
                 continue
-            if tau < origin_time or completion[0, tau, j] <= NEVER:
+            if completion[0, tau, j] <= NEVER:
                 continue
             mirrored = (last - tau) * n + j
             stand = prices.stand[tau, j] if priced else 0.0
@@ -203,28 +206,30 @@ def grow_labels(
             cut_keep = prices.cut_keep[j]
             least = fuel.least[tau, j] if limited else 0.0
             found = 0
-            # the arc index in_start[j] - 1 stands for waiting
-            for a in range(graph.in_start[j] - 1, graph.in_start[j + 1]):
-                waits = a < graph.in_start[j]
-                if tau == origin_time:
-                    if not waits or origin[j] <= NEVER:
+            # the arc index in_start[j] - 1 stands for waiting, the one before for starting
+            for a in range(graph.in_start[j] - 2, graph.in_start[j + 1]):
+                if a == graph.in_start[j] - 2:
+                    if origin[tau, j] <= NEVER or (collects_first and gain <= NEVER):
                         continue
                     first, beyond = 0, 1
                     before, keep, cost, burn, taken = 0, _ZERO, 0.0, 0.0, ORIGIN
                 else:
-                    if waits:
+                    if a < graph.in_start[j]:
+                        if tau == 0:
+                            continue
                         before = (tau - 1) * n + j
                         keep, cost, burn, taken = ~_ZERO, prices.wait_cost, fuel.wait, WAIT
                     else:
-                        if tau - graph.in_steps[a] < origin_time:
+                        if tau < graph.in_steps[a]:
                             continue
                         before = (tau - graph.in_steps[a]) * n + graph.in_from[a]
                         taken = graph.in_arc[a]
                         keep, cost, burn = graph.in_keep[a], prices.arc_cost[taken], fuel.arc[taken]
                     first, beyond = start[before], start[before + 1]
                 for k in range(first, beyond):
+                    forced = collects_first and taken == ORIGIN
                     if taken == ORIGIN:
-                        v, m, s, f = origin[j] - stand, _ZERO, _ZERO, 0.0
+                        v, m, s, f = origin[tau, j] - stand, _ZERO, _ZERO, fuel.spent[tau, j] if forced else 0.0
                     else:
                         v, m, s = value[k] - cost - stand, memory[k] & keep, cuts[k] & cut_keep
                         f = burnt[k] + burn
@@ -247,8 +252,8 @@ def grow_labels(
                         c_parent = np.concatenate((c_parent, np.empty(room - len(c_parent), np.int64)))
                         c_arc = np.concatenate((c_arc, np.empty(room - len(c_arc), np.int64)))
                         c_sensed = np.concatenate((c_sensed, np.empty(room - len(c_sensed), np.bool_)))
-                    idle = True
-                    if gain > 0.0 and m & bit == _ZERO:
+                    idle = not forced
+                    if (gain > 0.0 or forced) and m & bit == _ZERO:
                         paid = s & cut_of
                         v_sensed = v + gain
                         while paid != _ZERO:
@@ -265,8 +270,8 @@ def grow_labels(
                             c_sensed[found] = True
                             found += 1
                             # collecting now is never worse than later: the idle twin is dominated
-                            idle = limited or cut_of != _ZERO or not buys_back
-                            idle = idle or gain < prices.best_gain[tau + 1, j]
+                            better = buys_back and not limited and cut_of == _ZERO
+                            idle = idle and not (better and gain >= prices.best_gain[tau + 1, j])
                     if idle:
                         c_value[found] = v
                         c_memory[found] = m

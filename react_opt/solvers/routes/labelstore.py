@@ -73,8 +73,9 @@ class Prices(NamedTuple):
 class Fuel(NamedTuple):
     """The battery as a resource of the labels, J; ``budget`` infinite where it cannot bind.
 
-    ``least`` is ``(H + 1, n)``: the least energy with which a route is completed from here, J. ``rate`` are the
-    prices of a joule, first 0, at which the rest of a route has been bounded.
+    ``least`` is ``(H + 1, n)``: the least energy with which a route is completed from here, J, and ``spent`` that with
+    which it is brought here where it collects nothing on the way. ``rate`` are the prices of a joule, first 0, at which
+    the rest of a route has been bounded.
     """
 
     budget: float
@@ -82,6 +83,7 @@ class Fuel(NamedTuple):
     wait: float
     sense: float
     least: FloatArray
+    spent: FloatArray
     rate: FloatArray
 
 

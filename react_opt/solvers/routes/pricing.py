@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from react_opt.errors import UsageError
 from react_opt.route_problem import FloatArray, Route, RouteProblem
 from react_opt.solvers.routes.columns import Column, Duals, Priced, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
-from react_opt.solvers.routes.labels import flat_values, grow_labels, trace
-from react_opt.solvers.routes.labelstore import NEVER, Fuel, Graph, Labels, Prices, no_labels
-from react_opt.solvers.routes.linesearch import lowest_point
+from react_opt.solvers.routes.labels import grow_labels, trace
+from react_opt.solvers.routes.labelstore import NEVER, Fuel, Graph, Labels, MaskArray, Prices, no_labels
 from react_opt.solvers.routes.memory import Memory
 from react_opt.solvers.routes.recharge import recharging
 from react_opt.solvers.routes.region import Region
+from react_opt.solvers.routes.rest import Rests, price_table
 from react_opt.solvers.routes.routecolumn import route_column
 
 MAX_LABELS = 20_000_000
@@ -66,44 +65,15 @@ class RoutePricer:
         self.memory = memory
         self.labels = self.calls = 0  # of exact passes so far
         self.stop = np.zeros(1, np.uint8)  # not 0: labelling passes are given up at once
-        n, horizon = problem.n_cells, problem.horizon
+        n = problem.n_cells
         by_target = np.lexsort((problem.arc_from, problem.arc_to))
         self._in_arcs = by_target.astype(np.int64)
         self._in_start = np.searchsorted(problem.arc_to[by_target], np.arange(n + 1)).astype(np.int64)
         self._out_arcs = np.arange(problem.n_arcs, dtype=np.int64)
         self._no_labels = no_labels()
-        self._no_stand = np.zeros((1, 1))
         self.remember()
-        self._origin = []
-        self._finish = []
-        self._rate = [0.0] * len(problem.classes)
-        self._fuel: list[tuple[Fuel, Fuel]] = []
+        self.rests = Rests(problem, self.forward, self.backward)
         self._charging = recharging(problem)
-        no_gain = np.zeros((horizon + 1, n))
-        for group in problem.classes:
-            origin = np.full(n, NEVER)
-            origin[group.start] = 0.0
-            finish = np.zeros(n) if group.return_to < 0 else np.full(n, NEVER)
-            if group.return_to >= 0:
-                finish[group.return_to] = 0.0
-            self._origin.append(origin)
-            self._finish.append(finish)
-            costs = self._prices(no_gain, self._no_stand, -problem.arc_energy_j, -group.wait_j, (), ())
-            most = flat_values(self.forward, costs, origin, group.start_step, False).max(initial=NEVER)
-            budget = group.battery_j - group.reserve_j
-            collectable = int(np.count_nonzero(problem.reward.max(axis=1, initial=0.0) > 0))
-            most += group.sense_j * min(collectable, horizon - max(1, group.start_step) + 1)
-            binds = most > budget * (1 + 1e-12)
-            slack = budget + 1e-9 * max(1.0, budget) if binds else np.inf
-            costs = self._prices(no_gain, self._no_stand, problem.arc_energy_j, group.wait_j, (), ())
-            ahead = -flat_values(self.forward, costs, origin, group.start_step, False)
-            behind = -flat_values(self.backward, costs, finish, 0, False)
-            self._fuel.append(
-                (
-                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, behind[::-1].copy(), np.zeros(1)),
-                    Fuel(slack, problem.arc_energy_j, group.wait_j, group.sense_j, ahead[::-1].copy(), np.zeros(1)),
-                )
-            )
 
     def remember(self) -> None:
         """Take over ng-sets that have grown."""
@@ -131,7 +101,7 @@ class RoutePricer:
 
     def binds(self, group: int) -> bool:
         """Return whether the battery of a class can bind, so that labels carry it."""
-        return group in self._charging or bool(np.isfinite(self._fuel[group][0].budget))
+        return group in self._charging or bool(np.isfinite(self.rests.fuel[group][0].budget))
 
     def prices(self, group: int, duals: Duals, side: SidePrices, cuts: Sequence[Rank1Cut]) -> tuple[Prices, Prices]:
         """Return the prices of one class in both directions of time."""
@@ -146,11 +116,11 @@ class RoutePricer:
         gain[: max(1, data.start_step)] = NEVER
         costs = 0.0 if group in self._charging else problem.sigma * data.sense_j  # a charger may give it back
         gain[costs >= problem.reward.T] = NEVER
-        stand = self._no_stand if side.stand is None else side.stand
         arc_cost, wait_cost = problem.sigma * problem.arc_energy_j, problem.sigma * data.wait_j
-        priced = tuple(duals.cut)
-        ahead = self._prices(gain, stand, arc_cost, wait_cost, cuts, priced)
-        back = self._prices(gain[::-1], stand[::-1], arc_cost, wait_cost, cuts, priced)
+        ahead = price_table(gain, arc_cost, wait_cost, side.stand)
+        back = price_table(gain[::-1], arc_cost, wait_cost, None if side.stand is None else side.stand[::-1])
+        cut_of, cut_keep, price = self._cuts(cuts, tuple(duals.cut))
+        ahead, back = (one._replace(cut_of=cut_of, cut_keep=cut_keep, cut_price=price) for one in (ahead, back))
         return ahead, back
 
     def price(
@@ -194,21 +164,21 @@ class RoutePricer:
         floor = duals.group if floor is None else floor
         for group in range(len(self.problem.classes)) if groups is None else groups:
             ahead, back = self.prices(group, duals, side, cuts)
-            data = self.problem.classes[group]
             cutoff = float(floor[group]) - self._constant(group)
             most = MAX_LABELS if width is None else width
             if group in self._charging:
+                origin = self.rests.begin[group][self.problem.classes[group].start_step]
                 labels, complete = self._charging[group].grow(
-                    self.forward, ahead, side.charge, self._origin[group], cutoff, most, max_labels, self.stop
+                    self.forward, ahead, side.charge, origin, cutoff, most, max_labels, self.stop
                 )
             else:
-                fuel, bound = self._rest(group, back, onwards=True)
+                fuel, bound = self.rests.bound(group, back, onwards=True)
                 labels, complete = grow_labels(
                     self.forward,
                     ahead,
                     fuel,
-                    self._origin[group],
-                    data.start_step,
+                    self.rests.begin[group],
+                    False,
                     bound,
                     self._no_labels,
                     cutoff,
@@ -221,13 +191,13 @@ class RoutePricer:
                 self.labels += len(labels.value)
                 self.calls += 1
             chosen, top = self._finals(labels, group, columns)
-            found += [self.column(group, labels, label, cell) for label, cell in chosen]
+            found += [self.column(group, labels, label) for label in chosen]
             exact &= complete
             best[group] = max(cutoff, top) + self._constant(group)
             tops[group] = top + self._constant(group) if chosen else -np.inf
         return Priced(found, best if exact else None, tops)
 
-    def completions(
+    def endings(
         self,
         group: int,
         duals: Duals,
@@ -235,11 +205,10 @@ class RoutePricer:
         side: SidePrices,
         cuts: Sequence[Rank1Cut],
     ) -> tuple[Prices, Fuel, FloatArray, Labels | None, float]:
-        """Return what bounds every single label of a class.
+        """Return what bounds every single label of a class that collects something more.
 
-        Prices, battery, flat bound, labels from the horizon and cutoff.
-
-        The labels are None if there are too many.
+        Prices, battery, flat bound, labels from the last collection of a route backwards, and cutoff. The labels are
+        None if there are too many.
 
         Parameters
         ----------
@@ -250,16 +219,16 @@ class RoutePricer:
         """
         ahead, back = self.prices(group, duals, side, cuts)
         cutoff = floor - self._constant(group)
-        fuel, bound = self._rest(group, back, onwards=True)
-        spent, past = self._rest(group, ahead, onwards=False)
+        fuel, bound = self.rests.bound(group, back, onwards=True, collects=True)
+        spent, past = self.rests.bound(group, ahead, onwards=False)
         for prices in (back, back._replace(cut_of=np.zeros_like(back.cut_of))):
             # without the cuts the labels from the horizon are fewer and bound less sharply
             labels, complete = grow_labels(
                 self.backward,
                 prices,
                 spent,
-                self._finish[group],
-                0,
+                self.rests.last[group],
+                True,
                 past,
                 self._no_labels,
                 cutoff,
@@ -275,93 +244,51 @@ class RoutePricer:
     @property
     def joule_prices(self) -> list[float]:
         """Price of a joule for each class, from the last call; 0 where the battery cannot bind."""
-        return [self._charging[k].rate if k in self._charging else rate for k, rate in enumerate(self._rate)]
+        return [self._charging[k].rate if k in self._charging else p for k, p in enumerate(self.rests.joule_prices)]
 
-    def _rest(self, group: int, prices: Prices, *, onwards: bool) -> tuple[Fuel, FloatArray]:
-        """Return the battery with the prices of a joule, and the bound on the rest of a route at each of them.
-
-        The rest is worth at most ``bound[k, tau, i] + rate[k] * (battery left)``. ``prices`` are those of the
-        direction in which the rest is walked: backwards in time for labels that grow ``onwards``.
-        """
-        data = self.problem.classes[group]
-        fuel = self._fuel[group][0 if onwards else 1]
-        graph = self.backward if onwards else self.forward
-        origin, begin = (self._finish[group], 0) if onwards else (self._origin[group], data.start_step)
-
-        def at_rate(rate: float) -> FloatArray:
-            dearer = prices
-            if rate > 0.0:
-                dearer = prices._replace(
-                    gain=prices.gain - rate * data.sense_j,
-                    arc_cost=prices.arc_cost + rate * fuel.arc,
-                    wait_cost=prices.wait_cost + rate * data.wait_j,
-                )
-            bound = flat_values(graph, dearer, origin, begin, True)[::-1]
-            if len(prices.stand) > 1:
-                bound = np.where(bound > NEVER, bound + prices.stand[::-1], bound)
-            return np.ascontiguousarray(bound)
-
-        if not np.isfinite(fuel.budget):
-            return fuel, at_rate(0.0)[None]
-        here = (data.start_step, data.start) if onwards else None
-
-        def worth(rate: float) -> float:
-            bound = at_rate(rate)
-            top = bound[here] if here is not None else bound[0][origin_end].max(initial=NEVER)
-            return float(top) + rate * fuel.budget
-
-        origin_end = np.flatnonzero(self._finish[group] > NEVER)
-        best = lowest_point(worth, self._rate[group], float(prices.gain.max(initial=0.0)) / max(data.sense_j, 1.0))
-        self._rate[group] = best
-        rates = np.array([0.0, 0.4 * best, 0.75 * best, best, 1.3 * best, 2.0 * best]) if best > 0 else np.zeros(1)
-        return fuel._replace(rate=rates), np.stack([at_rate(float(rate)) for rate in rates])
-
-    def column(self, group: int, labels: Labels, label: int, cell: int) -> Column:
-        """Return the route of a label that stands in ``cell`` at the horizon."""
+    def column(self, group: int, labels: Labels, label: int) -> Column:
+        """Return the route of a label, which after the label's instant ends with the least energy."""
         problem, data = self.problem, self.problem.classes[group]
-        cells, arcs, senses = trace(labels, problem.arc_from, problem.arc_steps, label, cell, problem.horizon)
+        node = int(np.searchsorted(labels.start, label, side="right")) - 1
+        tau, cell = divmod(node, problem.n_cells)
+        cells, arcs, senses = trace(labels, problem.arc_from, problem.arc_steps, label, cell, tau)
+        rest = problem.horizon - tau
+        cells = np.concatenate((cells, np.full(rest, -1)))
+        arcs = np.concatenate((arcs, np.full(rest, -1)))
+        senses = np.concatenate((senses, np.zeros(rest, np.bool_)))
+        least = self.rests.fuel[group][0].least
+        while tau < problem.horizon:
+            ways = [(least[tau + 1, cell] + data.wait_j, tau + 1, cell, -1)]
+            for arc in range(problem.out_start[cell], problem.out_start[cell + 1]):
+                then, there = tau + int(problem.arc_steps[arc]), int(problem.arc_to[arc])
+                if then <= problem.horizon:
+                    ways.append((least[then, there] + problem.arc_energy_j[arc], then, there, arc))
+            _, then, cell, arcs[tau] = min(ways)
+            cells[then] = cell
+            tau = then
         begin, charging = data.start_step, self._charging.get(group)
         charge_j = np.zeros(len(cells) - begin) if charging is None else charging.credits(labels, label)
         return route_column(problem, Route(group, cells[begin:], arcs[begin:], senses[begin:], charge_j))
-
-    def allowed_end(self, group: int, labels: Labels) -> NDArray[np.bool_]:
-        """Return for each label at the horizon whether the class may end there."""
-        last = labels.start[self.problem.horizon * self.problem.n_cells :]
-        cell = np.searchsorted(last, np.arange(last[0], last[-1]), side="right") - 1
-        allowed: NDArray[np.bool_] = self._finish[group][cell] > NEVER
-        return allowed
 
     def _constant(self, group: int) -> float:
         """Return what the labels leave out: the weighted battery at the start."""
         return self.problem.sigma * self.problem.classes[group].battery_j
 
-    def _finals(self, labels: Labels, group: int, count: int) -> tuple[list[tuple[int, int]], float]:
-        """Return (label, cell) of the best labels at the horizon, and the best value."""
-        n, horizon = self.problem.n_cells, self.problem.horizon
-        first, beyond = int(labels.start[horizon * n]), int(labels.start[(horizon + 1) * n])
-        cell = np.searchsorted(labels.start[horizon * n :], np.arange(first, beyond), side="right") - 1
-        allowed = self.allowed_end(group, labels)
-        label, cell = np.arange(first, beyond)[allowed], cell[allowed]
+    def _finals(self, labels: Labels, group: int, count: int) -> tuple[list[int], float]:
+        """Return the best labels at the horizon, and the best value."""
+        last = labels.start[self.problem.horizon * self.problem.n_cells :]
+        label = np.arange(last[0], last[-1])
+        cell = np.searchsorted(last, label, side="right") - 1
+        label = label[self.rests.end[group][0, cell] > NEVER]
         if len(label) == 0:
             return [], NEVER
         order = np.argsort(-labels.value[label], kind="stable")[:count]
-        return [(int(label[k]), int(cell[k])) for k in order], float(labels.value[label[order[0]]])
+        return label[order].tolist(), float(labels.value[label[order[0]]])
 
-    def _prices(
-        self,
-        gain: FloatArray,
-        stand: FloatArray,
-        arc_cost: FloatArray,
-        wait_cost: float,
-        cuts: Sequence[Rank1Cut],
-        cut_price: Sequence[float],
-    ) -> Prices:
-        """Return prices in kernel time."""
-        n = self.problem.n_cells
-        best_gain = np.zeros((len(gain) + 1, n))
-        best_gain[:-1] = np.maximum.accumulate(np.maximum(gain, 0.0)[::-1])[::-1]
-        cut_of = np.zeros(n, dtype=np.uint64)
-        cut_keep = np.full(n, 0, dtype=np.uint64)
+    def _cuts(self, cuts: Sequence[Rank1Cut], cut_price: Sequence[float]) -> tuple[MaskArray, MaskArray, FloatArray]:
+        """Return the cuts that each cell belongs to, those that it remembers, and their prices."""
+        cut_of = np.zeros(self.problem.n_cells, dtype=np.uint64)
+        cut_keep = np.zeros(self.problem.n_cells, dtype=np.uint64)
         for k, cut in enumerate(cuts):
             if not isinstance(cut, SubsetRow):
                 raise UsageError("routes can be priced with subset-row cuts only")
@@ -370,13 +297,4 @@ class RoutePricer:
             cut_keep[list(cut.memory)] |= bit
         price = np.zeros(64)
         price[: len(cut_price)] = cut_price
-        return Prices(
-            np.ascontiguousarray(gain),
-            best_gain,
-            np.ascontiguousarray(stand),
-            arc_cost,
-            float(wait_cost),
-            cut_of,
-            cut_keep,
-            price,
-        )
+        return cut_of, cut_keep, price
