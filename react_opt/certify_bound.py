@@ -24,7 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from react_opt.certify_bound_choice import best_of, worthwhile_routes
+from react_opt.certify_bound_choice import best_of, repriced
+from react_opt.certify_bound_enumerate import worthwhile_routes
 from react_opt.certify_bound_route import Prices, best_route
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance, OrosRobot
@@ -180,8 +181,13 @@ def _bound_of_choice(instance: OrosInstance, leaf: Mapping[str, Any], prices: Pr
         if np.allclose(above, best, rtol=1e-9, atol=1e-9):
             break
         best = above
-    price = np.where(part.must, np.inf, prices.cell)
-    return best_of(found, best, counts, price, losable, floor)
+    cell = prices.cell
+    if "pool" in leaf and all(len(routes.value) for routes in found):
+        found, best, cell, total = repriced(found, counts, leaf["pool"], part.must, floor)
+        losable = total - floor
+        if losable <= 0.0:
+            return floor
+    return best_of(found, best, counts, np.where(part.must, np.inf, cell), losable, floor)
 
 
 def _rounded(instance: OrosInstance, bound: float) -> float:

@@ -1,142 +1,72 @@
-"""Bounds that rest on enumeration, computed again: every route that a better plan can hold, and the best choice.
+"""The best choice among enumerated routes, searched again: at the prices of the certificate, plainly.
 
 With prices, multipliers and the bound L that they prove, a plan of routes that collect no cell twice is worth
 
     L - sum_r (best of its class - worth of r after prices) - sum_i pi_i (1 - collected_i) - slack of cuts
 
 and all that is deducted is not negative. A plan worth more than B therefore holds only routes that lose less than
-L - B. They are enumerated here by a plain dynamic programme over exact sets of cells, the best route of each set, and
-combined by a plain search.
+L - B, at whatever prices.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from react_opt.certify_bound_route import (
-    MARGIN,
-    NEVER,
-    ONE,
-    Floats,
-    Moves,
-    Prices,
-    States,
-    Words,
-    cut_mask,
-    distances,
-    gains,
-    joined,
-    moves_of,
-    pick,
-    remembered,
-    rests_of,
-    sensed,
-)
-from react_opt.instance import OrosInstance, OrosRobot
-
-REMEMBERED = 8  # cells that the rest of a route remembers at each place, for a bound on it
+from react_opt.certify_bound_enumerate import Found
+from react_opt.certify_bound_route import MARGIN, Floats
+from react_opt.errors import UsageError
 
 
-class Found(NamedTuple):
-    """Routes: the cells each collects (64 to a word), its worth after prices, and its value in the objective."""
+def repriced(
+    found: list[Found], counts: list[int], pool: Mapping[str, Any], must: NDArray[np.bool_], floor: float
+) -> tuple[list[Found], list[float], Floats, float]:
+    """Return the routes that count at other prices, the most that one of each class is worth then, and the bound.
 
-    sets: Words
-    reduced: Floats
-    value: Floats
-
-
-class _Partial(NamedTuple):
-    """Partial routes in one place: cells collected, worth after prices, cut prices paid, cut states, energy used."""
-
-    sets: Words
-    worth: Floats
-    paid: Floats
-    cuts: Words
-    used_j: Floats
-
-
-def worthwhile_routes(
-    instance: OrosInstance,
-    robot: OrosRobot,
-    prices: Prices,
-    least: float,
-    joule_price: float,
-    first: NDArray[np.int64],
-    last_of: NDArray[np.int64],
-) -> Found:
-    """Return the best route for each set of cells among those that are worth ``least`` or more after prices.
+    The prices are of cells and of rank-1 cuts ``sum floor(sum_i times_i a_i / over) <= floor(sum_i times_i / over)``,
+    which every plan keeps. Of the routes those are left that lose no more than the bound lies above ``floor``. The
+    third result is the price of each cell.
 
     Parameters
     ----------
-    instance, robot
-        The instance, which has no limits between robots, and one of its robots.
-    prices
-        What the robot pays.
-    least
-        Worth after prices from which on a route counts.
-    joule_price
-        Price of a joule at which the battery is relaxed besides.
-    first, last_of
-        ``(n_cells,)`` instants between which it may collect each cell.
+    found, counts
+        Routes of each class and how many robots there are.
+    pool
+        ``cell_price`` and ``cuts`` (cells, times, over, price).
+    must
+        ``(n_cells,)`` cells that are collected in any case; only their price may be negative.
+    floor
+        Value of interest.
     """
-    n, last = len(instance.cells), instance.horizon_steps
-    index = {cell.id: i for i, cell in enumerate(instance.cells)}
-    moves = moves_of(instance, robot)
-    end = None if robot.return_to is None else index[robot.return_to]
-    budget = robot.battery_j - robot.reserve_j
-    budget += 1e-9 * max(1.0, budget)
-    gain = gains(instance, prices, robot, first, last_of)
-    constant = instance.sigma * robot.battery_j
-    floor = least - constant
-    floor -= MARGIN * max(1.0, abs(floor))
-    rests = rests_of(instance, robot, prices, moves, gain, end, joule_price)
-    behind = _endings(instance, robot, prices, moves, gain, end, floor)
-    nearby = _nearby(prices, moves)
-    limited = _can_run_dry(instance, moves, budget, last - robot.start_step)
-    words = (n + 63) // 64
-    waiting: list[dict[int, list[_Partial]]] = [{} for _ in range(last + 1)]
-    none, zero = np.zeros(1, np.uint64), np.zeros(1)
-    waiting[robot.start_step][index[robot.start]] = [_Partial(np.zeros((1, words), np.uint64), zero, zero, none, zero)]
-    for t in range(robot.start_step, last + 1):
-        for i, parts in waiting[t].items():
-            here = _Partial(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-            keep = here.used_j <= budget
-            for rate, rest in rests:
-                keep &= here.worth + rest[t, i] + rate * (budget - here.used_j) >= floor
-            here = _take(here, keep)
-            here = _take(here, _completed(here, behind[t].get(i), nearby[i], prices, budget, floor))
-            here = _one_per_set(_collected(here, i, gain[t, i], moves.sense_j, prices), limited)
-            here = _take(here, here.used_j <= budget)
-            if len(here.worth) == 0:
-                continue
-            if t == last:
-                waiting[t][i] = [here] if end is None or end == i else []
-                continue
-            idle = moves.idle_j
-            waiting[t + 1].setdefault(i, []).append(
-                here._replace(worth=here.worth - instance.sigma * idle, used_j=here.used_j + idle)
-            )
-            for j, steps, energy in moves.out[i]:
-                if t + steps <= last:
-                    waiting[t + steps].setdefault(j, []).append(
-                        here._replace(
-                            worth=here.worth - instance.sigma * energy,
-                            cuts=here.cuts & cut_mask(prices, j),
-                            used_j=here.used_j + energy,
-                        )
-                    )
-        if t < last:
-            waiting[t] = {}
-    ended = [part for parts in waiting[last].values() for part in parts]
-    if not ended:
-        return Found(np.zeros((0, words), np.uint64), np.zeros(0), np.zeros(0))
-    whole = _Partial(*(np.concatenate(column) for column in zip(*ended, strict=True)))
-    whole = _one_per_set(_take(whole, whole.worth >= floor), limited=False)
-    inside = np.unpackbits(whole.sets.view(np.uint8), axis=1, bitorder="little")[:, :n]
-    return Found(whole.sets, whole.worth + constant, whole.worth + whole.paid + constant + inside @ prices.cell)
+    cell = np.array(pool["cell_price"], dtype=np.float64)
+    if len(cell) != len(must) or not np.all(np.isfinite(cell)):
+        raise UsageError(f"the certificate prices {len(cell)} cells, the instance has {len(must)}")
+    cell = np.where(must, cell, np.maximum(0.0, cell))
+    total = float(cell.sum())
+    inside = [np.unpackbits(routes.sets.view(np.uint8), axis=1, bitorder="little")[:, : len(cell)] for routes in found]
+    worth = [routes.value - collected @ cell for routes, collected in zip(found, inside, strict=True)]
+    for cut in pool["cuts"]:
+        price, over = max(0.0, float(cut["price"])), int(cut["over"])
+        cells, times = [int(c) for c in cut["cells"]], np.array([int(t) for t in cut["times"]], dtype=np.int64)
+        if over < 1 or len(times) != len(cells) or len(set(cells)) != len(cells) or times.min(initial=0) < 0:
+            raise UsageError("the certificate holds a cut whose cells and multipliers do not fit")
+        total += price * (int(times.sum()) // over)
+        for value, collected in zip(worth, inside, strict=True):
+            value -= price * ((collected[:, cells].astype(np.int64) @ times) // over)
+    best = [float(value.max(initial=-math.inf)) for value in worth]
+    total += float(np.dot(counts, best))
+    least = total - floor + MARGIN * max(1.0, abs(floor))
+    left = [
+        Found(routes.sets[keep], value[keep], routes.value[keep])
+        for routes, value, keep in (
+            (routes, value, value >= most - least) for routes, value, most in zip(found, worth, best, strict=True)
+        )
+    ]
+    return left, best, cell, total
 
 
 def best_of(
@@ -194,172 +124,3 @@ def best_of(
 
     search(np.arange(len(value)), np.zeros(len(price), dtype=bool), list(counts), 0.0, 0.0)
     return top
-
-
-def _nearby(prices: Prices, moves: Moves) -> list[list[int]]:
-    """Return for each place the cells of its memory that are nearest to it, itself among them."""
-    near = []
-    for i, cells in enumerate(prices.memory):
-        steps = distances(moves, i, cells)
-        others = sorted((int(d), cell) for d, cell in zip(steps, cells, strict=True) if cell != i)
-        near.append(sorted([i] + [cell for _, cell in others[: REMEMBERED - 1]]))
-    return near
-
-
-def _endings(
-    instance: OrosInstance,
-    robot: OrosRobot,
-    prices: Prices,
-    moves: Moves,
-    gain: Floats,
-    end: int | None,
-    floor: float,
-) -> list[dict[int, States]]:
-    """Return for each instant and place the ways in which a route can end from there on, collecting there included.
-
-    They remember the nearest cells only: a relaxation. What no beginning could complete to ``floor`` is left out, and
-    so is what another ending beats that remembers no more.
-    """
-    n, last = len(instance.cells), instance.horizon_steps
-    near = _nearby(prices, moves)
-    local = prices._replace(memory=near)
-    into: list[list[tuple[int, int, float]]] = [[] for _ in range(n)]
-    for i in range(n):
-        for j, steps, energy in moves.out[i]:
-            into[j].append((i, steps, energy))
-    past = _beginnings(instance, robot, moves, gain)
-    endings: list[dict[int, States]] = [{} for _ in range(last + 1)]
-    waiting: list[dict[int, list[States]]] = [{} for _ in range(last + 1)]
-    nothing = np.zeros(1, dtype=np.uint64)
-    for i in range(n):
-        if end is None or end == i:
-            waiting[last][i] = [States(np.zeros(1), nothing, nothing, np.zeros(1))]
-    for t in range(last, robot.start_step - 1, -1):
-        for i, parts in waiting[t].items():
-            if past[t, i] == NEVER:
-                continue
-            states = sensed(joined(parts), i, gain[t, i], moves.sense_j, local)
-            states = _least_memory(pick(states, states.value + past[t, i] >= floor), prices)
-            if len(states.value) == 0:
-                continue
-            endings[t][i] = states
-            if t > robot.start_step:
-                waiting[t - 1].setdefault(i, []).append(
-                    states._replace(
-                        value=states.value - instance.sigma * moves.idle_j, used_j=states.used_j + moves.idle_j
-                    )
-                )
-            for j, steps, energy in into[i]:
-                if t - steps >= robot.start_step:
-                    waiting[t - steps].setdefault(j, []).append(
-                        States(
-                            states.value - instance.sigma * energy,
-                            remembered(states.memory, near[i], near[j]),
-                            states.cuts & cut_mask(prices, j),
-                            states.used_j + energy,
-                        )
-                    )
-        waiting[t] = {}
-    return endings
-
-
-def _beginnings(instance: OrosInstance, robot: OrosRobot, moves: Moves, gain: Floats) -> Floats:
-    """Return ``(T + 1, n)``: most that is earned before being in a place at an instant, without memory."""
-    n, last = len(instance.cells), instance.horizon_steps
-    best = np.full((last + 1, n), NEVER)
-    start = next(i for i, cell in enumerate(instance.cells) if cell.id == robot.start)
-    best[robot.start_step, start] = 0.0
-    for t in range(robot.start_step, last):
-        after = best[t] + np.maximum(0.0, gain[t])
-        best[t + 1] = np.maximum(best[t + 1], after - instance.sigma * moves.idle_j)
-        for i in np.flatnonzero(after > NEVER).tolist():
-            for j, steps, energy in moves.out[i]:
-                if t + steps <= last:
-                    best[t + steps, j] = max(best[t + steps, j], after[i] - instance.sigma * energy)
-    return best
-
-
-def _least_memory(states: States, prices: Prices) -> States:
-    """Return the states that no other beats which remembers no more; more odd cuts are bought off."""
-    states = pick(states, np.lexsort((states.used_j, -states.value)))
-    keep = np.ones(len(states.value), dtype=bool)
-    for k in range(len(keep)):
-        if not keep[k]:
-            continue
-        rest = slice(k + 1, None)
-        lead = states.value[k] - states.value[rest]
-        for cut, price in enumerate(prices.cut_price):
-            if (states.cuts[k] >> np.uint64(cut)) & ONE:
-                lead = lead - price * (((states.cuts[rest] >> np.uint64(cut)) & ONE) == 0)
-        beaten = (lead >= 0.0) & ((states.memory[k] & ~states.memory[rest]) == 0)
-        keep[rest] &= ~(beaten & (states.used_j[k] <= states.used_j[rest]))
-    return pick(states, keep)
-
-
-def _completed(
-    here: _Partial, endings: States | None, near: list[int], prices: Prices, budget: float, floor: float
-) -> NDArray[np.bool_]:
-    """Return which partial routes some ending completes to ``floor``."""
-    done = np.zeros(len(here.worth), dtype=bool)
-    if endings is None:
-        return done
-    held = np.zeros(len(here.worth), dtype=np.uint64)  # what has been collected of the cells that endings remember
-    for k, cell in enumerate(near):
-        held |= ((here.sets[:, cell // 64] >> np.uint64(cell % 64)) & ONE) << np.uint64(k)
-    for value, memory, cuts, used_j in zip(*endings, strict=True):
-        left = np.flatnonzero(~done)
-        total = here.worth[left] + value
-        left = left[(total >= floor) & ((held[left] & memory) == 0) & (here.used_j[left] + used_j <= budget)]
-        total = here.worth[left] + value
-        for cut, price in enumerate(prices.cut_price):
-            if (cuts >> np.uint64(cut)) & ONE:
-                total = total - price * ((here.cuts[left] >> np.uint64(cut)) & ONE)
-        done[left[total >= floor]] = True
-        if done.all():
-            break
-    return done
-
-
-def _collected(here: _Partial, cell: int, gain: float, sense_j: float, prices: Prices) -> _Partial:
-    """Return the partial routes and, where the cell has not been collected, their twins that collect it."""
-    if gain == NEVER:
-        return here
-    word, bit = cell // 64, ONE << np.uint64(cell % 64)
-    twin = _take(here, (here.sets[:, word] & bit) == 0)
-    sets, cuts, due = twin.sets.copy(), twin.cuts, np.zeros(len(twin.worth))
-    sets[:, word] |= bit
-    for k, cells in enumerate(prices.cut_cells):
-        if cell in cells:
-            mark = ONE << np.uint64(k)
-            due = due + prices.cut_price[k] * ((cuts & mark) != 0)
-            cuts = cuts ^ mark
-    twin = _Partial(sets, twin.worth + gain - due, twin.paid + due, cuts, twin.used_j + sense_j)
-    return _Partial(*(np.concatenate(pair) for pair in zip(here, twin, strict=True)))
-
-
-def _one_per_set(here: _Partial, limited: bool) -> _Partial:
-    """Return for each set the most valuable partial route in the plan, and those that use less energy."""
-    order = np.lexsort((here.used_j, -(here.worth + here.paid), *here.sets.T))
-    here = _take(here, order)
-    keep = np.ones(len(order), dtype=bool)
-    same = np.all(here.sets[1:] == here.sets[:-1], axis=1)
-    if not limited:
-        keep[1:] = ~same
-        return _take(here, keep)
-    least_j = np.inf
-    for k, used_j in enumerate(here.used_j.tolist()):
-        if k and same[k - 1] and used_j >= least_j:
-            keep[k] = False
-        else:
-            least_j = used_j
-    return _take(here, keep)
-
-
-def _can_run_dry(instance: OrosInstance, moves: Moves, budget: float, steps: int) -> bool:
-    """Return whether the battery could limit a robot: moving at the highest power and sensing each cell."""
-    power = max([moves.idle_j, *(energy / d for out in moves.out for _, d, energy in out)])
-    return bool(power * steps + moves.sense_j * min(len(instance.cells), steps + 1) > budget)
-
-
-def _take(here: _Partial, keep: Any) -> _Partial:
-    return _Partial(*(column[keep] for column in here))

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from react_opt.certify_bound import recompute_bound
+from react_opt.certify_bound_choice import repriced
+from react_opt.certify_bound_enumerate import Found
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance
 from react_opt.plan import Claim
-from react_opt.solvers.routes import engine
+from react_opt.solvers.routes import engine, finish
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.finish import Finish
 from react_opt.solvers.routes.tightening import Tightening
@@ -151,6 +153,45 @@ def test_a_bound_that_rests_on_enumeration_is_recomputed(monkeypatch: pytest.Mon
             forged = {**proof, "classes": [{**group, "best": group["best"] - 3.0} for group in proof["classes"]]}
             assert recompute_bound(instance, forged) >= best - 1e-9 * best
     assert enumerated >= 3
+
+
+def test_prices_over_enumerated_routes_are_recomputed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The programme over the routes proves the bound by its own prices and cuts; whatever these say, bounds hold."""
+    rested = 0
+    for seed in range(14):
+        instance = _walled(seed)
+        problem = route_problem(instance)
+        best = solve_routes(problem, work_limit=6000).objective
+        assert best is not None
+        with monkeypatch.context() as weak:
+            weak.setattr(engine, "FIRST_MEMORY", 1)
+            weak.setattr(finish, "FIRST_WORK", -1)
+            weak.setattr(Tightening, "cut", lambda self: False)
+            weak.setattr(Tightening, "grow_memory", lambda self: False)
+            for most_work in (-1, 10**9):
+                weak.setattr(finish, "MOST_WORK", most_work)
+                result = solve_routes(problem, work_limit=6000)
+                proof = result.certificate
+                assert best - 1e-9 * best <= recompute_bound(instance, proof) <= result.bound + 1e-8 * best
+                leaves = [leaf for leaf in proof.get("tree", [proof]) if "pool" in leaf]
+                rested += len(leaves)
+                for leaf in leaves:
+                    leaf["pool"]["cell_price"] = [1.5 * price + 1.0 for price in leaf["pool"]["cell_price"]]
+                    for cut in leaf["pool"]["cuts"]:
+                        cut["price"] *= 2.0
+                    leaf["bound"] -= 2.5
+                assert recompute_bound(instance, proof) >= best - 1e-9 * best
+    assert rested >= 3
+
+
+def test_cuts_over_routes_that_do_not_fit_are_refused() -> None:
+    """A cut needs one whole multiplier that is not negative for each of its cells."""
+    found = [Found(np.array([[1]], dtype=np.uint64), np.zeros(1), np.ones(1))]
+    must = np.zeros(2, dtype=bool)
+    for cut in ({"times": [1]}, {"times": [1, -1]}, {"cells": [0, 0]}, {"over": 0}):
+        pool = {"cell_price": [0.0, 0.0], "cuts": [{"cells": [0, 1], "times": [1, 1], "over": 2, "price": 1.0, **cut}]}
+        with pytest.raises(UsageError, match="do not fit"):
+            repriced(found, [1], pool, must, 0.0)
 
 
 def _lower(tree: list[dict]) -> None:

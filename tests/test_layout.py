@@ -19,8 +19,8 @@ MOST_LINES = 400
 LAYERS = [
     {"errors", "references", "instance", "plan", "trace", "jsonio", "kernels"},
     {"certify", "certify_base", "certify_replay", "certify_robot", "certify_oros"}
-    | {"certify_bound", "certify_bound_choice", "certify_bound_route", "certify_assignment", "certify_inspection"}
-    | {"certify_bound_charge", "certify_trace", "certify_scans"},
+    | {"certify_bound", "certify_bound_charge", "certify_bound_choice", "certify_bound_enumerate"}
+    | {"certify_bound_route", "certify_assignment", "certify_inspection", "certify_trace", "certify_scans"},
     {"geometry", "energy", "timegraph", "route_problem", "paths", "options", "interrupt", "areas", "passages"}
     | {"jobs", "jobs_file", "jobs_worker", "jobs_ray"},
     {"models", "claims"},

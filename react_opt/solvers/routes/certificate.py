@@ -8,6 +8,7 @@ from typing import Any
 
 from react_opt.route_problem import RouteProblem
 from react_opt.solvers.routes.cuts import SubsetRow
+from react_opt.solvers.routes.finish import Finished
 from react_opt.solvers.routes.generation import Multipliers
 from react_opt.solvers.routes.memory import Memory
 from react_opt.solvers.routes.rows import ChargeRow, SenseRow, StandRow
@@ -19,7 +20,7 @@ def certificate(
     memory: Memory,
     best: Multipliers,
     joule_price: Sequence[float],
-    enumerated: float | None = None,
+    enumerated: Finished | None = None,
 ) -> dict[str, Any]:
     """Return the certificate of a bound.
 
@@ -40,7 +41,7 @@ def certificate(
         is of no consequence for the bound.
     enumerated
         A smaller bound that rests on the enumeration of all routes that lose less than it lies below the
-        multipliers' own.
+        multipliers' own, and on prices over these routes if there are any.
     """
     return {
         "kind": "lagrangian",
@@ -79,7 +80,7 @@ def tree_certificate(problem: RouteProblem, memory: Memory, root: Part, joule_pr
             parts += [part.yes, part.no]
             continue
         bound = max(bound, part.bound)
-        if part.enumerated is not None and part.enumerated[1] <= part.bound:
+        if part.enumerated is not None and part.enumerated[1].bound <= part.bound:
             nodes.append(_prices(problem, part.enumerated[0], joule_price, part.enumerated[1]))
         else:
             nodes.append(_prices(problem, part.known, joule_price))
@@ -91,7 +92,7 @@ def _remembered(memory: Memory) -> str | list[list[int]]:
 
 
 def _prices(
-    problem: RouteProblem, best: Multipliers, joule_price: Sequence[float], enumerated: float | None = None
+    problem: RouteProblem, best: Multipliers, joule_price: Sequence[float], enumerated: Finished | None = None
 ) -> dict[str, Any]:
     """Return the prices of a bound."""
     priced_cuts = [
@@ -113,7 +114,7 @@ def _prices(
             continue
         priced_rows.append({**place, "price": float(price)})
     return {
-        **({"bound": float(best.bound)} if enumerated is None else {"bound": float(enumerated), "enumerated": True}),
+        **({"bound": float(best.bound)} if enumerated is None else _of_enumeration(enumerated)),
         "cell_price": [float(price) for price in best.duals.cell],
         "classes": [
             {"robots": list(group.robots), "best": float(worth), "joule_price": float(rate)}
@@ -122,3 +123,17 @@ def _prices(
         "cuts": priced_cuts,
         "rows": priced_rows,
     }
+
+
+def _of_enumeration(finished: Finished) -> dict[str, Any]:
+    """Return a bound that rests on enumerated routes, and the prices over these."""
+    said = {"bound": float(finished.bound), "enumerated": True}
+    pool = finished.pool
+    if pool is None:
+        return said
+    cuts = [
+        {"cells": list(cut.cells), "times": list(cut.times), "over": cut.over, "price": float(price)}
+        for cut, price in zip(pool.cuts, pool.price, strict=True)
+        if price > 0
+    ]
+    return {**said, "pool": {"cell_price": [float(price) for price in pool.cell], "cuts": cuts}}

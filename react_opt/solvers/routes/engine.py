@@ -153,9 +153,9 @@ class _Proof:
         """Enumerate the routes that a better plan can contain; return whether that ends the search."""
         best = self.generation.best
         assert best is not None
-        bound = self.finish.bound(best)
-        if bound is not None and self.standing.lower_bound_to(bound):
-            self.proof = certificate(self.problem, self.memory, best, self.pricer.joule_prices, bound)
+        finished = self.finish.bound(best)
+        if finished is not None and self.standing.lower_bound_to(finished.bound):
+            self.proof = certificate(self.problem, self.memory, best, self.pricer.joule_prices, finished)
         return self.standing.done()
 
     def _branch(self) -> None:

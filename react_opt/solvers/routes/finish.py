@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
+from react_opt.route_problem import FloatArray
 from react_opt.solvers.routes.budget import Standing
 from react_opt.solvers.routes.choice import Pool, best_choice
-from react_opt.solvers.routes.columns import Duals
+from react_opt.solvers.routes.columns import Duals, Rank1Cut
+from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.enumeration import Enumerated, enumerate_routes
 from react_opt.solvers.routes.generation import Generation, Multipliers
+from react_opt.solvers.routes.pool import PoolPrices, PoolProgram
+from react_opt.solvers.routes.setcuts import SetCut
 
 EASIER = 0.7  # share of the last hopeless gap at which it is tried again
 LEAST_LABELS, MOST_LABELS = 1_000_000, 8_000_000  # of the enumeration of one class
 LABELS_PER_LABEL = 3  # in between: as many times the labels of all pricings so far, which are dearer
-MOST_ROUTES = 200_000
-MOST_WORK = 1_000_000_000  # looks at routes when choosing among them, about a second
+MOST_ROUTES = 500_000
+FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choosing among them, at most about a second
+
+
+class Finished(NamedTuple):
+    """A bound on a region's plans, and the prices over enumerated routes that it rests on, None if on none."""
+
+    bound: float
+    pool: PoolPrices | None = None
 
 
 class Finish:
@@ -38,11 +52,11 @@ class Finish:
         self.routes = 0  # enumerated in the attempts that succeeded
         self._hopeless_gap = np.inf
 
-    def bound(self, best: Multipliers, *, anew: bool = False) -> float | None:
+    def bound(self, best: Multipliers, *, anew: bool = False) -> Finished | None:
         """Return the bound of the region looked at after enumeration; None if there are too many routes.
 
-        What is not enumerated cannot beat the incumbent, so the bound is that of the choice or the incumbent,
-        whichever is larger. Better plans found are offered.
+        What is not enumerated cannot beat the incumbent, so the bound is that of the routes enumerated or the
+        incumbent, whichever is larger. Better plans found are offered.
 
         Parameters
         ----------
@@ -73,45 +87,73 @@ class Finish:
             )
             standing.budget.spend()
             if routes is None or sum(len(one.label) for one in (*found, routes)) > MOST_ROUTES:
-                if not anew:
-                    self._hopeless_gap = EASIER * gap
+                self._hopeless_gap = self._hopeless_gap if anew else EASIER * gap
                 return None
             found.append(routes)
-        worth, complete = self._choose(found, duals, gap)
-        standing.budget.spend()
+        finished, complete = self._choose(found, duals, gap)
         if not complete:
-            if not anew:
-                self._hopeless_gap = EASIER * gap
-            return None
+            self._hopeless_gap = self._hopeless_gap if anew else EASIER * gap
         self.routes += sum(len(one.label) for one in found)
-        return max(worth, floor)
+        return finished._replace(bound=max(finished.bound, floor))
 
-    def _choose(self, found: list[Enumerated], duals: Duals, gap: float) -> tuple[float, bool]:
-        """Offer the best choice of routes; return the most that a choice is worth and whether that is certain."""
+    def _choose(self, found: list[Enumerated], duals: Duals, gap: float) -> tuple[Finished, bool]:
+        """Offer the best choice of routes; return the most that a choice is worth and whether that is certain.
+
+        Between attempts to choose, a linear programme over the routes enumerated leaves fewer of them.
+        """
+        standing, counts = self.standing, np.array(self.generation.master.counts, dtype=np.int64)
+        region = self.generation.side.region
+        must = np.zeros(len(duals.cell), np.bool_) if region is None else region.must
+        loss = np.concatenate([duals.group[k] - one.reduced for k, one in enumerate(found)])
+        group = np.concatenate([np.full(len(one.label), k, np.int64) for k, one in enumerate(found)])
+        value, sets = np.concatenate([one.value for one in found]), np.concatenate([one.sets for one in found])
+        order = np.argsort(loss, kind="stable")
+        pool, price, program = Pool(value[order], loss[order], group[order], sets[order]), duals.cell, None
+        worth, going = self._best_of(pool, np.where(must, np.inf, np.maximum(price, 0.0)), gap, FIRST_WORK, found)
+        if not going:
+            return Finished(worth), True
+        if not np.array_equal(np.unique(pool.group), np.arange(len(counts))):
+            return Finished(standing.objective or 0.0), True
+        program = PoolProgram(pool, _set_prices(duals, self.generation.master.cuts), counts.tolist(), must, standing)
+        while True:
+            more = program.tighten()
+            prices, floor = program.prices, standing.objective
+            assert floor is not None
+            gap = prices.bound - floor + 1e-7 * max(1.0, abs(prices.bound))
+            if standing.proven(prices.bound):
+                return Finished(prices.bound, prices), True
+            price = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
+            worth, going = self._best_of(program.pool, price, gap, FIRST_WORK if more else MOST_WORK, found)
+            if not going:
+                return Finished(worth, prices), True
+            if not more:
+                return Finished(prices.bound, prices), False
+
+    def _best_of(
+        self, pool: Pool, price: FloatArray, gap: float, most_work: int, found: list[Enumerated]
+    ) -> tuple[float, bool]:
+        """Offer the best choice from a pool; return its value and whether there may be a better one."""
         standing, pricer = self.standing, self.generation.pricer
         floor = -np.inf if standing.objective is None else standing.objective
-        region = self.generation.side.region
-        price = np.maximum(duals.cell, 0.0)
-        if region is not None:
-            price[region.must] = np.inf
-        loss = np.concatenate([duals.group[k] - one.reduced for k, one in enumerate(found)])
-        order = np.argsort(loss, kind="stable")
-        group = np.concatenate([np.full(len(one.label), k, np.int64) for k, one in enumerate(found)])
-        pool = Pool(
-            np.concatenate([one.value for one in found])[order],
-            loss[order],
-            group[order],
-            np.concatenate([one.sets for one in found])[order],
-        )
         counts = np.array(self.generation.master.counts, dtype=np.int64)
-        best, worth, complete = best_choice(pool, counts, price, gap, floor, MOST_WORK, pricer.stop)
+        best, worth, complete = best_choice(pool, counts, price, gap, floor, most_work, pricer.stop)
+        standing.budget.spend()
         if best[0] >= 0:
-            within = np.concatenate([np.arange(len(one.label)) for one in found])[order]
             columns = [
-                pricer.column(k, found[k].labels, int(found[k].label[r]))
-                for k, r in zip(group[order][best].tolist(), within[best].tolist(), strict=True)
+                pricer.column(k, found[k].labels, int(found[k].label[np.all(found[k].sets == sets, axis=1)][0]))
+                for k, sets in zip(pool.group[best].tolist(), pool.sets[best], strict=True)
             ]
             columns.sort(key=lambda column: column.group)
             standing.offer([column.path for column in columns])
             worth = max(worth, sum(column.value for column in columns))
-        return worth, complete
+        return worth, not complete
+
+
+def _set_prices(duals: Duals, cuts: Sequence[Rank1Cut]) -> PoolPrices:
+    """Return prices of the same cells and, for cuts, of those over the same cells without limits to the memory."""
+    price: dict[SetCut, float] = {}
+    for cut, worth in zip(cuts, duals.cut.tolist(), strict=True):
+        if isinstance(cut, SubsetRow) and worth > 0.0:
+            whole = SetCut(tuple(sorted(cut.cells)), (1, 1, 1), 2)
+            price[whole] = price.get(whole, 0.0) + worth
+    return PoolPrices(np.inf, duals.cell, duals.group, tuple(price), np.array(list(price.values())))

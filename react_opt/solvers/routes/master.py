@@ -273,5 +273,7 @@ class Master:
 
 
 def _key(column: Column) -> tuple[int, bytes, bytes]:
-    """Return what tells a column from others: its group and where and when it stands and senses."""
+    """Return what tells a column from others: its group, and its path or, where it has none, its cells."""
+    if column.path is None:
+        return column.group, np.array(column.cells).tobytes(), b""
     return column.group, column.path.cell.tobytes(), column.path.sense.tobytes()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from react_opt.solvers.routes.budget import Standing
-from react_opt.solvers.routes.finish import Finish
+from react_opt.solvers.routes.finish import Finish, Finished
 from react_opt.solvers.routes.generation import Generation, Multipliers
 from react_opt.solvers.routes.master import MasterPoint
 from react_opt.solvers.routes.region import Region, Split, collections_of, everything
@@ -48,7 +48,7 @@ class Part:
     split: Split | None = None
     yes: Part | None = None
     no: Part | None = None
-    enumerated: tuple[Multipliers, float] | None = None
+    enumerated: tuple[Multipliers, Finished] | None = None
 
 
 class Tree:
@@ -139,11 +139,11 @@ class Tree:
 
     def _enumerated(self, part: Part, *, anew: bool = False) -> bool:
         """Lower a part's bound by enumeration; return whether that closes it."""
-        bound = self.finish.bound(part.known, anew=anew)
-        if bound is None:
+        finished = self.finish.bound(part.known, anew=anew)
+        if finished is None:
             return False
-        if bound < part.bound:
-            part.bound, part.enumerated = bound, (part.known, bound)
+        if finished.bound < part.bound:
+            part.bound, part.enumerated = finished.bound, (part.known, finished)
         return self.standing.proven(self.standing.lattice.round_down(part.bound))
 
     def notes(self) -> list[str]:

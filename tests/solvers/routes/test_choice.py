@@ -5,7 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from react_opt.certify_bound_choice import Found, best_of
+from react_opt.certify_bound_choice import best_of
+from react_opt.certify_bound_enumerate import Found
 from react_opt.solvers.routes.choice import Pool, best_choice
 
 

@@ -1,0 +1,121 @@
+"""Enumerated routes, the linear programme over them and its cuts, against trying everything."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from route_brute import best_per_set, random_problem
+from test_choice import _by_trying, _case
+from test_tree import grid_problem
+
+from react_opt.models.replay import value
+from react_opt.solvers.routes import engine, finish
+from react_opt.solvers.routes.budget import Budget, Standing
+from react_opt.solvers.routes.columns import Duals
+from react_opt.solvers.routes.engine import solve_routes
+from react_opt.solvers.routes.enumeration import enumerate_routes
+from react_opt.solvers.routes.memory import Memory, fewest_steps
+from react_opt.solvers.routes.pool import PoolPrices, PoolProgram
+from react_opt.solvers.routes.pricing import RoutePricer
+from react_opt.solvers.routes.result import unpriced
+from react_opt.solvers.routes.setcuts import MULTIPLIERS, SetCut, separate_sets
+from react_opt.solvers.routes.tightening import Tightening
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_best_route_of_every_set_that_loses_little_is_enumerated(seed: int) -> None:
+    """All sets within the gap, each with the value of its best route, and a route that has that value."""
+    problem = random_problem(seed)
+    if unpriced(problem) is not None:
+        pytest.skip("chargers are not priced")
+    rng = np.random.default_rng(seed)
+    price = rng.integers(0, 12, problem.n_cells).astype(np.float64)
+    pricer = RoutePricer(problem, Memory(fewest_steps(problem), int(rng.integers(1, 4))))
+    none = np.zeros(0)
+    for k, group in enumerate(problem.classes):
+        every = best_per_set(problem, group)
+        if not every:
+            continue
+        cells = {known: [i for i in range(problem.n_cells) if known >> i & 1] for known in every}
+        reduced = {known: worth - price[cells[known]].sum() for known, worth in every.items()}
+        floor = max(reduced.values()) - float(rng.integers(0, 15)) - 0.5
+        found = enumerate_routes(pricer, k, Duals(price, np.zeros(len(problem.classes)), none, none), floor)
+        assert found is not None
+        got = dict(zip(found.sets[:, 0].tolist(), found.value.tolist(), strict=True))
+        wanted = {known: worth for known, worth in every.items() if reduced[known] >= floor}
+        assert got == pytest.approx(wanted)
+        for known, label in zip(found.sets[:, 0].tolist(), found.label.tolist(), strict=True):
+            column = pricer.column(k, found.labels, label)
+            assert sorted(column.cells) == cells[known]
+            assert column.value == pytest.approx(wanted[known])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cuts_over_sets_hold_for_all_plans_and_are_broken_where_they_are_separated(seed: int) -> None:
+    """Plans are routes that share no cell; the coefficient is the sum of multipliers, rounded down exactly."""
+    rng = np.random.default_rng(seed)
+    n = 9
+    inside = (rng.random((12, n)) < 0.45).astype(np.uint8)
+    share = rng.uniform(0.1, 0.5, 12)
+    share /= max(1.0, float((share @ inside).max()))
+    cuts = separate_sets(inside, share, set(), 500)
+    assert {len(cut.cells) for cut in cuts} <= {3, 4, 5}
+    for cut in cuts:
+        assert share @ cut.coefficients(inside) > cut.rhs + 0.01
+        assert (tuple(sorted(cut.times, reverse=True)), cut.over) in MULTIPLIERS
+        parts = [Fraction(time, cut.over) for time in cut.times]
+        assert cut.rhs == sum(parts) // 1
+        exact = [sum(p for cell, p in zip(cut.cells, parts, strict=True) if row[cell]) // 1 for row in inside]
+        assert cut.coefficients(inside).tolist() == exact
+        for owner in product(range(3), repeat=len(cut.cells)):  # any way to share the cells among three routes
+            plan = np.zeros((3, n), dtype=np.uint8)
+            plan[list(owner), list(cut.cells)] = 1
+            assert cut.coefficients(plan).sum() <= cut.rhs
+    if seed == 0:
+        assert separate_sets(inside, share, set(cuts), 500) != cuts
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_programme_over_routes_bounds_the_best_choice_and_keeps_its_routes(seed: int) -> None:
+    """The bound falls, never below the best choice that beats the floor, and routes of that are never dropped."""
+    pool, inside, counts, price, bound = _case(seed)
+    wanted = _by_trying(pool, inside, counts)
+    if wanted == -np.inf or len(np.unique(pool.group)) < len(counts):
+        pytest.skip("there is no plan")
+    standing = Standing(random_problem(0), Budget(None, None, None), None, None)
+    standing.objective = wanted - 0.5
+    none: tuple[SetCut, ...] = ()
+    first = PoolPrices(np.inf, price, np.zeros(len(counts)), none, np.zeros(0))
+    program = PoolProgram(pool, first, counts.tolist(), np.zeros(len(price), np.bool_), standing)
+    assert program.prices.bound <= bound + 1e-9
+    going, before = True, program.prices.bound
+    while going:
+        going = program.tighten()
+        assert wanted - 1e-9 <= program.prices.bound <= before + 1e-9
+        before = program.prices.bound
+        rows = np.unpackbits(program.pool.sets.view(np.uint8), axis=1, bitorder="little")[:, : len(price)]
+        assert _by_trying(program.pool, rows.astype(bool), counts) == pytest.approx(wanted)
+        assert program.loss().min() >= -1e-9
+
+
+def test_optima_by_the_programme_over_routes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without cuts of the pricing or memory, choosing only after prices and cuts over the routes: the same optima."""
+    rested = 0
+    for seed in range(20):
+        problem = grid_problem(seed)
+        best = solve_routes(problem, work_limit=6000).objective
+        with monkeypatch.context() as weak:
+            weak.setattr(finish, "FIRST_WORK", -1)
+            weak.setattr(engine, "FIRST_MEMORY", 1)
+            weak.setattr(Tightening, "cut", lambda self: False)
+            weak.setattr(Tightening, "grow_memory", lambda self: False)
+            result = solve_routes(problem, work_limit=6000)
+        assert result.status == "optimal"
+        assert result.objective == pytest.approx(best)
+        assert result.routes is not None
+        assert value(problem, result.routes) == pytest.approx(best)
+        rested += "pool" in result.certificate
+    assert rested >= 1
