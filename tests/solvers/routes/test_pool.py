@@ -28,8 +28,6 @@ from react_opt.solvers.routes.tightening import Tightening
 def test_the_best_route_of_every_set_that_loses_little_is_enumerated(seed: int) -> None:
     """All sets within the gap, each with the value of its best route, and a route that has that value."""
     problem = random_problem(seed)
-    if problem.charger_j.any():
-        pytest.skip("with chargers nothing is enumerated")
     rng = np.random.default_rng(seed)
     price = rng.integers(0, 12, problem.n_cells).astype(np.float64)
     pricer = RoutePricer(problem, Memory(fewest_steps(problem), int(rng.integers(1, 4))))
