@@ -32,8 +32,12 @@ from react_opt.limits.hidden import Hidden
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_SHARED = 1000
-"""So many ways to share regions among robots are tried at most: that limits how many regions are counted."""
+MOST_COUNTED = 8
+MOST_SHARED = 4100
+"""So many ways to share regions among robots are tried at most: that limits how many regions are counted, too."""
+
+ROUNDS = 4
+"""How often the search for a family begins anew."""
 
 _GUIDE = np.array((1.0, 0.3, 0.1, 0.03))
 """The search for a family goes by the bound, and a little by those with a half, a quarter and nothing to spare."""
@@ -80,7 +84,7 @@ class Detours:
         for r in range(robots):
             start = np.ascontiguousarray(self.start_s[r, family])
             alone[r], least = detour_s(self.start_block_s[r], start, between, block)
-            times[r] = group_s(least, self.begin, self.lists)
+            times[r] = group_s(np.ascontiguousarray(least.T), self.begin, self.lists).T
         hidden_in = np.zeros(times.shape[2], dtype=np.int64)
         for m, n in enumerate(family):
             hidden_in |= self.inside[n].astype(np.int64) << m
@@ -90,31 +94,38 @@ class Detours:
     def strongest(self, share: float, robots: int, first: list[int]) -> tuple[float, int]:
         """Return a strong bound on seeing a share, s, and how many regions it counts.
 
-        The search begins with the first ones of a list of regions, as many as serve best; then the region that helps
-        most is added, again and again. Where all have been tried once, only those that did best are tried again.
+        The search begins with the first ones of a list of regions, as many as serve best. Then, :data:`ROUNDS` times,
+        some of the best family found are dropped at random (none at first), and the region that helps most is added,
+        again and again. Where all have been tried once, only those that did best are tried again.
         """
         total = self.hidden.total
         slack = total - int(np.ceil(share * total - 1e-9))
         needed = [total - slack, total - slack // 2, total - slack // 4, total]
-        most = int(np.log(MOST_SHARED) / np.log(robots + 1))
+        most = min(MOST_COUNTED, int(np.log(MOST_SHARED) / np.log(robots + 1)))
+        known: dict[frozenset[int], tuple[float, float]] = {}
 
         def worth(family: list[int]) -> tuple[float, float]:
-            bounds = self.bounds_s(family, robots, needed)
-            return float(np.where(np.isfinite(bounds), bounds, _NEVER_S) @ _GUIDE), float(bounds[0])
+            key = frozenset(family)
+            if key not in known:
+                bounds = self.bounds_s(sorted(family), robots, needed)
+                known[key] = float(np.where(np.isfinite(bounds), bounds, _NEVER_S) @ _GUIDE), float(bounds[0])
+            return known[key]
 
-        families = [first[:size] for size in range(min(most, len(first)) + 1)]
-        (best, bound), size = max((worth(family), -len(family)) for family in families)
-        family = families[-size]
+        kept = max((first[:size] for size in range(min(most, len(first)) + 1)), key=worth)
         tried = list(range(len(self.inside)))
-        while len(family) < most:
-            ranked = [(worth([*family, n]), -n) for n in tried if n not in family]
-            ranked.sort(reverse=True)
-            if not ranked or ranked[0][0][0] <= best + 1e-6:
-                break
-            best, bound = ranked[0][0]
-            family = [*family, -ranked[0][1]]
-            tried = [-n for _, n in ranked[: max(_TRIED, len(ranked) // 4)]]
-        return bound, len(family)
+        rng = np.random.default_rng(0)
+        for n in range(ROUNDS):
+            family = [region for region in kept if n == 0 or rng.random() > 0.4]
+            while len(family) < most:
+                ranked = sorted(((worth([*family, m]), -m) for m in tried if m not in family), reverse=True)
+                if not ranked or ranked[0][0] <= worth(family):
+                    break
+                family.append(-ranked[0][1])
+                tried = [-m for _, m in ranked[: max(_TRIED, len(ranked) // 4)]]
+            kept = max(kept, family, key=worth)
+            tried = [int(m) for m in rng.permutation(len(self.inside))[: 3 * _TRIED]]
+        bound, size = max((bound, -len(key)) for key, (_, bound) in known.items())  # the search goes by more than that
+        return bound, -size
 
 
 @kernel
@@ -210,15 +221,14 @@ def detour_s(
 
 @kernel
 def group_s(least: FloatArray, begin: IntArray, lists: IntArray) -> FloatArray:
-    """Return ``(sets, groups)`` the least of the times at the blocks that see each group."""
-    groups = begin.shape[0] - 1
-    found = np.full((least.shape[0], groups), np.inf)
-    for chosen in range(least.shape[0]):
-        for g in range(groups):
-            best = np.inf
-            for n in range(begin[g], begin[g + 1]):
-                best = min(best, least[chosen, lists[n]])
-            found[chosen, g] = best
+    """Return ``(groups, sets)`` the least of the times, ``(blocks, sets)``, at the blocks that see each group."""
+    groups, sets = begin.shape[0] - 1, least.shape[1]
+    found = np.full((groups, sets), np.inf)
+    for g in range(groups):
+        for n in range(begin[g], begin[g + 1]):
+            b = lists[n]
+            for chosen in range(sets):
+                found[g, chosen] = min(found[g, chosen], least[b, chosen])
     return found
 
 
