@@ -106,20 +106,25 @@ class _Proof:
 
     def run(self) -> None:
         """Go on until the plan is proven or a limit is reached."""
-        if self.standing.routes is not None:
-            budget = self.standing.budget
+        budget = self.standing.budget
+        ascent = DualAscent(self.generation, self.memory, self.seed, self.threads)
+        many = self.problem.n_cells >= MANY_CELLS and self.problem.reward.size >= MANY_PLACES
+        if many:  # a bound first; what searches beside the proof has time enough
+            ascent.slots()
+            self._keep_certificate()
+        if self.standing.routes is not None and (not many or budget.work_limit is not None):
             wait_s = FIRST_SEARCH_S * self.problem.n_cells
             if budget.deadline is not None:
                 wait_s = min(wait_s, 0.05 * max(0.0, budget.deadline - budget.begun))
             self._improve_until(time.perf_counter() + wait_s, FIRST_SEARCH_WORK)
+        if self.standing.routes is not None:
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
         if self.standing.done():
             return
-        ascent = DualAscent(self.generation, self.memory, self.seed, self.threads)
-        ascent.slots()
-        if self.problem.n_cells >= MANY_CELLS and self.problem.reward.size >= MANY_PLACES:
-            self._keep_certificate()
+        if many:
             ascent.smooth()
+        else:
+            ascent.slots()
         self._keep_certificate()
         if self._tighten():
             self._branch()
