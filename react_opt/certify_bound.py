@@ -182,8 +182,10 @@ def _bound_of_choice(instance: OrosInstance, leaf: Mapping[str, Any], prices: Pr
             break
         best = above
     cell = prices.cell
-    if "pool" in leaf and all(len(routes.value) for routes in found):
-        found, best, cell, total = repriced(found, counts, leaf["pool"], part.must, floor)
+    for stage in leaf.get("pool", []):
+        if not all(len(routes.value) for routes in found):
+            return floor
+        found, best, cell, total = repriced(found, counts, stage, part.must, floor)
         losable = total - floor
         if losable <= 0.0:
             return floor

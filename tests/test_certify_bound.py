@@ -176,9 +176,10 @@ def test_prices_over_enumerated_routes_are_recomputed(monkeypatch: pytest.Monkey
                 leaves = [leaf for leaf in proof.get("tree", [proof]) if "pool" in leaf]
                 rested += len(leaves)
                 for leaf in leaves:
-                    leaf["pool"]["cell_price"] = [1.5 * price + 1.0 for price in leaf["pool"]["cell_price"]]
-                    for cut in leaf["pool"]["cuts"]:
-                        cut["price"] *= 2.0
+                    for stage in leaf["pool"]:
+                        stage["cell_price"] = [1.5 * price + 1.0 for price in stage["cell_price"]]
+                        for cut in stage["cuts"]:
+                            cut["price"] *= 2.0
                     leaf["bound"] -= 2.5
                 assert recompute_bound(instance, proof) >= best - 1e-9 * best
     assert rested >= 3

@@ -127,13 +127,17 @@ def _prices(
 
 def _of_enumeration(finished: Finished) -> dict[str, Any]:
     """Return a bound that rests on enumerated routes, and the prices over these."""
-    said = {"bound": float(finished.bound), "enumerated": True}
-    pool = finished.pool
-    if pool is None:
-        return said
-    cuts = [
-        {"cells": list(cut.cells), "times": list(cut.times), "over": cut.over, "price": float(price)}
-        for cut, price in zip(pool.cuts, pool.price, strict=True)
-        if price > 0
-    ]
-    return {**said, "pool": {"cell_price": [float(price) for price in pool.cell], "cuts": cuts}}
+    said: dict[str, Any] = {"bound": float(finished.bound), "enumerated": True}
+    if finished.stages:
+        said["pool"] = [
+            {
+                "cell_price": [float(price) for price in stage.cell],
+                "cuts": [
+                    {"cells": list(cut.cells), "times": list(cut.times), "over": cut.over, "price": float(price)}
+                    for cut, price in zip(stage.cuts, stage.price, strict=True)
+                    if price > 0
+                ],
+            }
+            for stage in finished.stages
+        ]
+    return said

@@ -25,10 +25,10 @@ FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choos
 
 
 class Finished(NamedTuple):
-    """A bound on a region's plans, and the prices over enumerated routes that it rests on, None if on none."""
+    """A bound on a region's plans, and the prices over enumerated routes that it rests on, one after the other."""
 
     bound: float
-    pool: PoolPrices | None = None
+    stages: tuple[PoolPrices, ...] = ()
 
 
 class Finish:
@@ -121,13 +121,13 @@ class Finish:
             assert floor is not None
             gap = prices.bound - floor + 1e-7 * max(1.0, abs(prices.bound))
             if standing.proven(prices.bound):
-                return Finished(prices.bound, prices), True
+                return Finished(prices.bound, tuple(program.stages)), True
             price = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
             worth, going = self._best_of(program.pool, price, gap, FIRST_WORK if more else MOST_WORK, found)
             if not going:
-                return Finished(worth, prices), True
+                return Finished(worth, tuple(program.stages)), True
             if not more:
-                return Finished(prices.bound, prices), False
+                return Finished(prices.bound, tuple(program.stages)), False
 
     def _best_of(
         self, pool: Pool, price: FloatArray, gap: float, most_work: int, found: list[Enumerated]

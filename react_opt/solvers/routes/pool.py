@@ -89,6 +89,7 @@ class PoolProgram:
         self._add_cuts(first.cuts)
         self._stalled = 0
         self.prices = first
+        self.stages: list[PoolPrices] = []  # prices at which routes were dropped
         self._look(first.cell, first.price, np.inf)
 
     @property
@@ -100,7 +101,10 @@ class PoolProgram:
         """Lower the bound by prices and cuts and drop routes; return whether it is worth while to go on."""
         before, floor = self.prices.bound, self._standing.objective
         point = self._converge()
-        if point is None or floor is None:
+        if floor is None:
+            return False
+        if point is None:
+            self._drop(self.prices.bound - floor + 1e-7 * max(1.0, abs(floor)))
             return False
         used = np.flatnonzero(point.use > TINY)
         inside = np.zeros((len(used), self._inside.shape[1]), dtype=np.uint8)
@@ -195,7 +199,8 @@ class PoolProgram:
         self._rows = sp.hstack([self._rows, *more], format="csr") if more else self._rows
 
     def _drop(self, most: float) -> None:
-        """Leave out the routes that lose more than ``most``."""
+        """Leave out the routes that lose more than ``most`` at the best prices."""
+        self.stages.append(self.prices)
         loss = self.loss()
         keep = np.flatnonzero(loss <= most)
         keep = keep[np.argsort(loss[keep], kind="stable")]
