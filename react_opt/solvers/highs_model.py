@@ -74,7 +74,10 @@ def to_highs(program: Program, *, names: bool = True) -> highspy.Highs:
 
 
 def write_model(program: Program, path: str | Path) -> None:
-    """Write a program as an MPS or LP file that other solvers read: names, sense and integrality survive.
+    """Write a program as an MPS or LP file that other solvers read: names and integrality survive.
+
+    An MPS file is always a minimisation: of a program that maximises, the negated objective. Its sense would stand in a
+    section that some readers skip (CBC's, with a remark), and they then solve another problem. An LP file states it.
 
     Parameters
     ----------
@@ -99,7 +102,11 @@ def write_model(program: Program, path: str | Path) -> None:
             raise UsageError(f"{path}: the {what} name {bad!r} cannot be written in MPS and LP files")
     if not path.parent.is_dir():
         raise ReactError(f"{path}: there is no directory {path.parent}")
-    if to_highs(program).writeModel(str(path)) == highspy.HighsStatus.kError or not path.is_file():
+    highs = to_highs(program)
+    if path.suffix == ".mps" and program.maximise:
+        highs.changeColsCost(program.n_columns, np.arange(program.n_columns, dtype=np.int32), -program.cost)
+        highs.changeObjectiveSense(highspy.ObjSense.kMinimize)
+    if highs.writeModel(str(path)) == highspy.HighsStatus.kError or not path.is_file():
         raise ReactError(f"{path}: the model could not be written")
 
 

@@ -6,15 +6,18 @@ import json
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+from extras import need
 
 from benchmarks import command, report, runner
 from benchmarks.compare import compare
 from benchmarks.families import FAMILIES
 from benchmarks.peers import PEERS, Limits, load_peers
-from benchmarks.suites import SUITES, Suite, of_family
+from benchmarks.suites import SUITES, Entry, Suite, of_family
 from benchmarks.verdicts import exposures
 from react_opt import check, jsonio, solve
 from react_opt.errors import InputError, UsageError
@@ -153,23 +156,62 @@ def test_a_killed_run_counts_as_unsolved(tmp_path: Path) -> None:
     assert "killed above 20 MB" in (tmp_path / "r.html").read_text()
 
 
-@pytest.mark.parametrize("name", ["walled_grid", "generalised", "inspection_tight"])
-def test_exported_models_solved_outside_agree(tmp_path: Path, name: str) -> None:
-    """The MPS file, read and solved by HiGHS alone, has the optimum that the JSON file has here."""
+def by_highs(file: Path) -> float:
     import highspy
 
-    suite = Suite("trial", "", 1.0, tuple(of_family(name, "tiny", [4], ())))
-    assert command.export(suite, str(tmp_path)) == 1
-    (file,) = tmp_path.glob("*.json")
-    plan = solve(jsonio.load(file), threads=1, explain=False)
     highs = highspy.Highs()
     highs.setOptionValue("output_flag", False)
     highs.setOptionValue("mip_rel_gap", 1e-9)
-    assert highs.readModel(str(file.with_suffix(".mps"))) == highspy.HighsStatus.kOk
+    assert highs.readModel(str(file)) == highspy.HighsStatus.kOk
     highs.run()
-    value = highs.getInfo().objective_function_value
-    objective = plan.claim.objective
-    assert abs(value) == pytest.approx(objective, rel=1e-6)  # MPS files of HiGHS may hold the negated objective
+    return float(highs.getInfo().objective_function_value)
+
+
+def by_scip(file: Path) -> float:
+    need("pyscipopt", "scip")
+    import pyscipopt
+
+    model = pyscipopt.Model()
+    model.hideOutput()
+    model.setParam("limits/gap", 1e-9)
+    model.readProblem(str(file))
+    model.optimize()
+    return float(model.getObjVal())
+
+
+def by_cbc(file: Path) -> float:
+    need("cylp", "peers")
+    from cylp.cy import CyClpSimplex
+
+    simplex = CyClpSimplex()
+    simplex.logLevel = 0
+    assert simplex.readMps(str(file)) == 0
+    model = simplex.getCbcModel()
+    model.logLevel = 0
+    model.solve()
+    return float(model.objectiveValue)
+
+
+@pytest.mark.extras
+@pytest.mark.parametrize("solver", [by_highs, by_scip, by_cbc])
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("chargers", {"rows": 2, "cols": 3, "robots": 1, "horizon": 8}),
+        ("generalised", {"robots": 3, "targets": 8, "type": "C"}),
+        ("inspection_tight", {"robots": 2, "targets": 5}),
+    ],
+)
+def test_exported_models_solved_outside_agree(
+    tmp_path: Path, name: str, parameters: dict[str, Any], solver: Callable[[Path], float]
+) -> None:
+    """The MPS file, which minimises, solved without this package has the optimum that the JSON file has here."""
+    suite = Suite("trial", "", 1.0, (Entry({"family": name, "parameters": parameters, "seed": 4}, ()),))
+    assert command.export(suite, str(tmp_path)) == 1
+    (file,) = tmp_path.glob("*.json")
+    plan = solve(jsonio.load(file), threads=1, explain=False)
+    assert plan.claim.status == "optimal"
+    assert -solver(file.with_suffix(".mps")) == pytest.approx(plan.claim.objective, rel=1e-6)
 
 
 def test_text_of_files_cannot_become_script(tmp_path: Path) -> None:
