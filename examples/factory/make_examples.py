@@ -87,7 +87,7 @@ def mission(robots: int, profile: Profile) -> Mission:
         robots=start.robots,
         delta=0.95,
         strategy="react",
-        postpone_below=0.3,
+        postpone_below=0.6,
         noise=Noise(speed=0.05, waiting_s=0.3, power=0.02),
         seed=1,
     )

@@ -19,13 +19,13 @@ from react_opt.orchestrator.orders import Driver, able, distance_m
 from react_opt.orchestrator.regions import Region, Regions, seen_from
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
 from react_opt.orchestrator.survey import COARSE, Block, Survey
-from react_opt.orchestrator.survey_kernels import OPEN
+from react_opt.orchestrator.survey_kernels import OPEN, ways_out
 from react_opt.orchestrator.tours import insert_all, plan_tours
 
 REPLAN_S = 3.0
 TRIES = 8
 SHARES = np.array([0.8, 0.9, 0.95, 0.97, 0.99, 1.0])
-WEIGHTS = np.array([0.3, 1.0, 0.5, 2.0, 1.5, 1.0])
+WEIGHTS = np.array([0.2, 0.6, 0.5, 3.0, 2.0, 1.5])
 """Shares of the expected whole whose times count, and how much."""
 KEEP_S = 2.0
 """What turning away from the present target costs, s: new plans must be better than that."""
@@ -34,6 +34,10 @@ SERVICE_S = 1.0
 MOST_TARGETS = 40
 WORK = 8_000
 FAR_S = 1e4
+AHEAD_S, NEAR_M = 1.5, 0.4
+"""Which way a robot sets out is seen so far ahead; what lies nearer than that has no direction."""
+SHARP_RAD = 0.8
+"""A robot slows down for a sharper turn."""
 FIELD_S = 6.0
 """Drive times from a place are worked out again after so long, s."""
 SAME_M = 2.5
@@ -136,7 +140,7 @@ class ReactPlus:
         if not found:
             self.goals, self.tours = {}, []
             return
-        start_s = np.array([[field[region.view] for region in found] for field in fields]) + SERVICE_S
+        start_s = self._starts(robots, fields, found) + SERVICE_S
         start_s[~np.isfinite(start_s)] = FAR_S
         between_s = self._between(belief.t_s, found)
         value = np.array([region.value_m2 for region in found])
@@ -151,6 +155,26 @@ class ReactPlus:
         for robot, tour in zip(robots, tours, strict=True):
             self._take(robot, found[tour[0]] if tour else None, notes)
         self.goals = {name: goal for name, goal in self.goals.items() if name in {robot.id for robot in robots}}
+
+    def _starts(self, robots: list[RobotView], fields: FloatArray, found: list[Region]) -> FloatArray:
+        """Return ``(R, K)`` s from robots to regions: the drive, and the turn onto the way there with its braking.
+
+        Without the turn a plan that sends a robot back the way it came looks as good as one that goes on.
+        """
+        assert self.survey is not None
+        views = np.array([region.view for region in found], dtype=np.int64)
+        rows = []
+        for robot, field in zip(robots, fields, strict=True):
+            ahead = ways_out(field, views, AHEAD_S)
+            x, y = self.survey.to_blocks((robot.x_m, robot.y_m)) / COARSE
+            dx, dy = ahead[:, 1] + 0.5 - x, ahead[:, 0] + 0.5 - y
+            heading = robot.yaw_rad - self.survey.map.origin_yaw_rad
+            turn = np.abs((np.arctan2(dy, dx) - heading + np.pi) % (2 * np.pi) - np.pi)
+            turn[np.hypot(dx, dy) * self.survey.coarse_m < NEAR_M] = 0.0
+            profile = robot.profile
+            brakes_s = np.where(turn > SHARP_RAD, profile.speed_max_m_s / profile.accel_m_s2, 0.0)
+            rows.append(field[views[:, 0], views[:, 1]] + profile.turn_time_s(turn) + brakes_s)
+        return np.array(rows)
 
     def _between(self, now_s: float, found: list[Region]) -> FloatArray:
         """Return s between the places of regions, from fields that are at most a few seconds old."""

@@ -174,6 +174,44 @@ def drive_times(passable: Flags, slowness: FloatArray, row: int, col: int) -> Fl
 
 
 @kernel
+def ways_out(cost: FloatArray, places: NDArray[np.int64], near: float) -> NDArray[np.int64]:
+    """Return by which block the quickest way to each of some places leaves the block that a field starts from.
+
+    Parameters
+    ----------
+    cost
+        As of :func:`drive_times`.
+    places
+        ``(K, 2)`` rows and columns.
+    near
+        The ways are followed back to the first block that is so near, s.
+
+    Returns
+    -------
+    blocks
+        ``(K, 2)`` rows and columns; the place itself where it is that near or has no way.
+    """
+    rows, cols = cost.shape
+    blocks = places.copy()
+    for k in range(places.shape[0]):
+        r, c = places[k, 0], places[k, 1]
+        if not np.isfinite(cost[r, c]):
+            continue
+        while cost[r, c] > near:
+            best, y, x = cost[r, c], r, c
+            for dr in range(-1, 2):
+                for dc in range(-1, 2):
+                    a, b = r + dr, c + dc
+                    if 0 <= a < rows and 0 <= b < cols and cost[a, b] < best:
+                        best, y, x = cost[a, b], a, b
+            if y == r and x == c:
+                break
+            r, c = y, x
+        blocks[k, 0], blocks[k, 1] = r, c
+    return blocks
+
+
+@kernel
 def view_gain(blocks: Grid, x: float, y: float, reach: float, mean_free: float, rays: int) -> float:
     """Return the expected number of hidden blocks that a scan reveals, by polar integration along rays.
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from react_opt.geometry.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from react_opt.orchestrator.regions import seen_from
 from react_opt.orchestrator.survey import COARSE, Survey
-from react_opt.orchestrator.survey_kernels import drive_times
+from react_opt.orchestrator.survey_kernels import drive_times, ways_out
 
 from .drawn import PROFILE
 
@@ -92,3 +92,15 @@ def test_a_gap_narrower_than_the_robot_is_no_way() -> None:
     cells[30:32, 20:27] = FREE
     assert np.isfinite(survey_of(cells).times_from(3.0, 1.0, optimistic=True)[25, 10])
     assert ndimage.label(survey_of(cells).may)[1] == 1
+
+
+def test_the_way_out_leads_around_a_wall_and_a_near_place_is_its_own() -> None:
+    """From (4, 1) the place (4, 5) lies behind a wall that is open at the lower end alone: one sets out downwards."""
+    passable = np.ones((7, 7), dtype=bool)
+    passable[1:, 3] = False
+    cost = drive_times(passable, np.ones(passable.shape), 4, 1)
+    places = np.array([[4, 5], [4, 2], [6, 3]])
+    out = ways_out(cost, places, 2.0)
+    assert out[0].tolist() == [2, 1] or out[0].tolist() == [2, 2]
+    assert out[1].tolist() == [4, 2]
+    assert out[2].tolist() == [6, 3], "there is no way there"
