@@ -200,15 +200,16 @@ class Loop:
             self.ways[robot.id] = []
             return robot
         way, left = self.ways[robot.id], robot.profile.speed_max_m_s * step_s
-        x, y = robot.x_m, robot.y_m
+        x, y, yaw = robot.x_m, robot.y_m, robot.yaw_rad
         while way and left > 0:
             gap = float(np.hypot(way[0][0] - x, way[0][1] - y))
+            yaw = float(np.arctan2(way[0][1] - y, way[0][0] - x)) if gap > 0 else yaw
             if gap <= left:
                 (x, y), left = way.pop(0), left - gap
             else:
                 x, y = x + (way[0][0] - x) * left / gap, y + (way[0][1] - y) * left / gap
                 left = 0.0
-        return replace(robot, x_m=x, y_m=y, state="driving" if way else "idle")
+        return replace(robot, x_m=x, y_m=y, yaw_rad=yaw, state="driving" if way else "idle")
 
     def known_share(self) -> float:
         """Return the share of the free pixels that are known."""
