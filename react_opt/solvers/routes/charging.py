@@ -10,6 +10,7 @@ c in battery, at the beginning and by sensing less, is worth sigma for each joul
 most the lead, and at most what can be charged from here on. So k beats c if
 
     v_k - v_c >= sum of what the cells that only k remembers can still earn
+                 + prices of the cuts whose state is odd in k only
                  + sigma min(lead + what it saves in sensing, what can be charged yet).
 """
 
@@ -176,7 +177,7 @@ def grow_charging(
     Parameters
     ----------
     graph, prices
-        Arcs and prices forwards in time; cuts are ignored.
+        Arcs and prices forwards in time.
     slot
         ``(T + 1, n)`` price of charging, or ``(1, 1)`` if there is none.
     charge
@@ -196,6 +197,7 @@ def grow_charging(
     size = 4096
     value = np.empty(size)
     memory = np.empty(size, np.uint64)
+    cuts = np.empty(size, np.uint64)
     used = np.empty(size)
     parent = np.empty(size, np.int64)
     arc = np.empty(size, np.int64)
@@ -204,6 +206,7 @@ def grow_charging(
     room = 256
     c_value = np.empty(room)
     c_memory = np.empty(room, np.uint64)
+    c_cuts = np.empty(room, np.uint64)
     c_used = np.empty(room)
     c_parent = np.empty(room, np.int64)
     c_arc = np.empty(room, np.int64)
@@ -222,6 +225,7 @@ def grow_charging(
             stand = prices.stand[tau, j] if priced else 0.0
             toll = slot[tau, j] if scarce else 0.0
             gain, bit, limit = prices.gain[tau, j], graph.bit[j], charge.limit[tau, j]
+            cut_of, cut_keep = prices.cut_of[j], prices.cut_keep[j]
             worth_it = gain + charge.sigma * charge.sense > 0.0
             found = 0
             # the arc index in_start[j] - 1 stands for waiting
@@ -246,9 +250,10 @@ def grow_charging(
                 hoped = max(0.0, charge.sigma * amount - toll)
                 for k in range(first, beyond):
                     if taken == ORIGIN:
-                        v, m, f = origin[j] - stand, _ZERO, 0.0
+                        v, m, s, f = origin[j] - stand, _ZERO, _ZERO, 0.0
                     else:
-                        v, m, f = value[k] - cost - stand, memory[k] & keep, used[k] + burn
+                        v, m, s = value[k] - cost - stand, memory[k] & keep, cuts[k] & cut_keep
+                        f = used[k] + burn
                     if v + hoped + completion[0, tau, j] < cutoff:
                         if taken == ORIGIN:
                             continue
@@ -267,12 +272,19 @@ def grow_charging(
                         c_value = np.concatenate((c_value, np.empty(room - len(c_value))))
                         c_used = np.concatenate((c_used, np.empty(room - len(c_used))))
                         c_memory = np.concatenate((c_memory, np.empty(room - len(c_memory), np.uint64)))
+                        c_cuts = np.concatenate((c_cuts, np.empty(room - len(c_cuts), np.uint64)))
                         c_parent = np.concatenate((c_parent, np.empty(room - len(c_parent), np.int64)))
                         c_arc = np.concatenate((c_arc, np.empty(room - len(c_arc), np.int64)))
                         c_sensed = np.concatenate((c_sensed, np.empty(room - len(c_sensed), np.bool_)))
                     for senses in range(1, -1, -1):
                         if senses and not (worth_it and m & bit == _ZERO):
                             continue
+                        earned = 0.0
+                        if senses:
+                            earned, paid = gain, s & cut_of
+                            while paid != _ZERO:
+                                earned -= prices.cut_price[lowest_bit(paid)]
+                                paid &= paid - _ONE
                         drained = f + senses * charge.sense
                         credit = max(0.0, min(amount, drained - charge.floor))
                         for charges in range(1, -1, -1):
@@ -283,8 +295,9 @@ def grow_charging(
                             left = drained - charges * credit
                             if left > limit:
                                 continue
-                            c_value[found] = v + senses * gain + charges * (charge.sigma * credit - toll)
+                            c_value[found] = v + earned + charges * (charge.sigma * credit - toll)
                             c_memory[found] = m | bit if senses else m
+                            c_cuts[found] = s ^ cut_of if senses else s
                             c_used[found] = left
                             c_parent[found] = k
                             c_arc[found] = taken
@@ -301,6 +314,7 @@ def grow_charging(
                 value = np.concatenate((value, np.empty(size - len(value))))
                 used = np.concatenate((used, np.empty(size - len(used))))
                 memory = np.concatenate((memory, np.empty(size - len(memory), np.uint64)))
+                cuts = np.concatenate((cuts, np.empty(size - len(cuts), np.uint64)))
                 parent = np.concatenate((parent, np.empty(size - len(parent), np.int64)))
                 arc = np.concatenate((arc, np.empty(size - len(arc), np.int64)))
                 sensed = np.concatenate((sensed, np.empty(size - len(sensed), np.bool_)))
@@ -308,7 +322,7 @@ def grow_charging(
             rich, yet = charge.rich[tau, j], charge.yet[tau, j]
             for rank in range(found):
                 c = order[rank]
-                v, m, f = c_value[c], c_memory[c], c_used[c]
+                v, m, s, f = c_value[c], c_memory[c], c_cuts[c], c_used[c]
                 dominated = False
                 for k in range(begin, count):
                     if used[k] > f and used[k] > rich:
@@ -321,6 +335,10 @@ def grow_charging(
                         slack -= prices.best_gain[later, graph.cell_of[j, colour]]
                         lead += charge.sense
                         extra &= extra - _ONE
+                    odd = cuts[k] & ~s
+                    while odd != _ZERO and slack >= 0.0:
+                        slack -= prices.cut_price[lowest_bit(odd)]
+                        odd &= odd - _ONE
                     if slack >= charge.sigma * min(lead, yet):
                         dominated = True
                         break
@@ -329,22 +347,27 @@ def grow_charging(
                 if count - begin >= width:
                     complete = False
                     break
-                value[count], memory[count], used[count] = v, m, f
+                value[count], memory[count], cuts[count], used[count] = v, m, s, f
                 parent[count], arc[count], sensed[count] = c_parent[c], c_arc[c], c_sensed[c]
                 count += 1
             if count > max_labels:
-                complete = False
-                stop_at = node + 1
-                for rest in range(stop_at, (last + 1) * n + 1):
+                for rest in range(node + 1, (last + 1) * n + 1):
                     start[rest] = count
-                none = np.zeros(count, np.uint64)
-                return Labels(start, value, memory, none, used, parent, arc, sensed), False
+                return Labels(start, value, memory, cuts, used, parent, arc, sensed), False
     start[(last + 1) * n] = count
-    none = np.zeros(count, np.uint64)
-    labels = Labels(
-        start, value[:count], memory[:count], none, used[:count], parent[:count], arc[:count], sensed[:count]
+    return (
+        Labels(
+            start,
+            value[:count],
+            memory[:count],
+            cuts[:count],
+            used[:count],
+            parent[:count],
+            arc[:count],
+            sensed[:count],
+        ),
+        complete,
     )
-    return labels, complete
 
 
 @kernel(nogil=True)

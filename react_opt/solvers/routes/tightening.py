@@ -77,8 +77,8 @@ class Tightening:
     def cut(self) -> bool:
         """Add violated subset-row cuts, in place of those without a price; return whether there were any."""
         point, master = self.generation.point, self.master
-        if point is None or len(point.use) != len(master.columns) or self.problem.charger_j.any():
-            return False  # labels that charge know no cuts
+        if point is None or len(point.use) != len(master.columns):
+            return False
         cuts = separate(master.columns, point.use, self.problem.n_cells, master.cuts, MOST_CUTS_AT_ONCE)
         if not cuts:
             return False
