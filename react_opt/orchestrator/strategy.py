@@ -1,4 +1,4 @@
-"""The role of a strategy: from the belief to orders, at every map update."""
+"""The role of a strategy: from the belief to orders, whenever there is something new."""
 
 from __future__ import annotations
 
@@ -68,7 +68,12 @@ class Strategy(Protocol):
     """
 
     def decide(self, belief: Belief) -> Decision:
-        """Return what changes now; called at every map update and whenever a robot arrives, gets stuck or dies."""
+        """Return what changes now.
+
+        The simulator calls it at most once a second while the map changes, at once when a robot arrives, gets stuck or
+        dies or its link comes back, and every 5 s as long as a robot stands idle and the
+        last decision was not ``done``.
+        """
         ...
 
 
