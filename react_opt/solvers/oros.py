@@ -31,6 +31,7 @@ BUILD_S = 1e-5  # per column of the monolith, to build it and hand it to a solve
 GREEDY_S = 2.0  # granted to the greedy plan where the deadline is nearer
 COUPLED_SHARE = 0.3  # of the time, for the decomposition where there are limits between robots
 COUPLED_S, SMALL_COLUMNS = 1.0, 50_000  # at most so long where the monolith is small
+FEW_COLUMNS = 3000  # of a monolith that proves what chargers leave open
 IMPROVE_S, IMPROVE_SHARE, IMPROVE_WORK = 1.0, 0.05, 20  # primal search before the monolith
 
 
@@ -139,13 +140,19 @@ def _coupled(problem: RouteProblem) -> bool:
 
 
 def _routes_then_monolith(search: Search) -> None:
-    """Where the decomposition ends without a proof, which limits between robots may cause, the monolith goes on."""
+    """Where the decomposition ends without a proof, which limits between robots may cause, the monolith goes on.
+
+    So it does after chargers, where it is small; a large one proves less than the decomposition does.
+    """
     coupled = _coupled(search.problem)
-    _routes(search, _until(search) if coupled else None)
-    ended = coupled or search.limit == "none"
+    charging = bool((search.problem.charger_j > 0).any()) and column_count(search.problem) <= FEW_COLUMNS
+    _routes(search, _until(search) if coupled or charging else None)
+    ended = coupled or charging or search.limit == "none"
     if proven(search) or not ended or search.infeasible is not None or search.options.stopped():
         return
-    cause = "limits between robots kept it from a proof" if coupled else "it ended without a proof"
+    cause = "it ended without a proof"
+    if coupled or charging:
+        cause = f"{'limits between robots' if coupled else 'chargers'} kept it from a proof"
     search.method = f"routes, then monolith: {cause}"
     search.settings["routes"] = {"solver": search.solver, "limit": search.limit}
     _monolith(search)
