@@ -6,6 +6,7 @@ chooses anew when it has arrived, when its frontier is gone (it has been seen), 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -47,7 +48,7 @@ class Choice:
     beyond_s: FloatArray
 
 
-class Frontiers:
+class Frontiers(ABC):
     """Base of the frontier strategies (see this module)."""
 
     knows_areas = False
@@ -62,9 +63,9 @@ class Frontiers:
         self.given_up: list[tuple[float, float]] = []
         self.last_s = -np.inf
 
+    @abstractmethod
     def choose(self, choice: Choice) -> list[int]:
         """Return for each robot the index of its frontier, -1 for none."""
-        raise NotImplementedError
 
     def decide(self, belief: Belief) -> Decision:
         """Return what changes now."""

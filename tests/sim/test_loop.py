@@ -10,6 +10,8 @@ import numpy as np
 from react_opt.certify_trace import check_trace
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.instance import Noise
+from react_opt.orchestrator.belief import Belief
+from react_opt.orchestrator.strategy import Decision
 from react_opt.sim.loop import Simulation
 from react_opt.trace import NEVER, Trace
 from tests.sim.missions import TWO_ROOMS, mission
@@ -84,3 +86,22 @@ def test_a_map_that_is_turned_is_driven_all_the_same() -> None:
     trace = Simulation(of, turned).run()
     assert trace.frames[-1].coverage > 0.97
     assert check_trace(of, trace, turned.cells).violations == ()
+
+
+class Waits:
+    """Orders nothing, and says that it is not done."""
+
+    def __init__(self) -> None:
+        self.asked_s: list[float] = []
+
+    def decide(self, belief: Belief) -> Decision:
+        self.asked_s.append(belief.t_s)
+        return Decision()
+
+
+def test_a_strategy_that_leaves_a_robot_standing_is_asked_again() -> None:
+    """Nothing new is seen by a robot that stands; what was given up for a while would never be tried again."""
+    strategy = Waits()
+    Simulation(mission([(1.5, 1.5)], horizon_s=30.0), TWO_ROOMS, strategy=strategy).run()
+    assert len(strategy.asked_s) >= 5
+    assert all(b - a <= 5.0 for a, b in itertools.pairwise(strategy.asked_s))

@@ -118,10 +118,13 @@ class PoolProgram:
         priced = dict(zip(self._master.cuts, point.duals.cut.tolist(), strict=True))
         cuts = separate_sets(inside, point.use[used], set(self.cuts), CUTS_AT_ONCE)
         if len(self._master.cuts) + len(cuts) > MOST_CUTS:
-            kept = np.flatnonzero([priced[cut] > TINY for cut in self._master.cuts])
+            # what routes lose is counted at the best prices, so the cuts that have one there stay
+            best: dict[object, float] = dict(zip(self.cuts, self._extended()[1].tolist(), strict=True))
+            idle = {cut for cut in self._master.cuts if priced[cut] <= TINY and best.get(cut, 0.0) <= 0.0}
+            kept = np.flatnonzero([cut not in idle for cut in self._master.cuts])
             n = self._inside.shape[1]
             self._rows = self._rows[:, np.concatenate((np.arange(n), n + kept))]
-            self._master.drop_cuts(lambda cut: priced[cut] <= TINY)
+            self._master.drop_cuts(lambda cut: cut in idle)
         self._add_cuts(cuts[: max(0, MOST_CUTS - len(self._master.cuts))])
         return bool(cuts)
 
