@@ -17,7 +17,7 @@ from react_opt.solvers.inspection import gate
 
 SEEN_M = 0.5  # a target that is still unknown from here will stay so
 MOST_TARGETS = 24  # of one inspection, by value: the others wait for the next one
-WORK_LIMIT = 60
+WORK_LIMIT = 20
 
 
 class Inspection:

@@ -58,7 +58,7 @@ def test_verdicts(campaign: Campaign) -> None:
     assert rows["react, 90 % against the best frontier", "3"] == ("23% less", "met")
     assert rows["naive / react, 90%", "3"] == ("1.05", "NOT met")
     assert rows["naive / react, 95%", "3"] == ("not reached", "met")
-    assert rows["OROS, saving by switching (area explored)", "1"] == ("15.0%", "met")
+    assert rows["OROS, saving by switching (area_explored)", "1"] == ("15.0%", "met")
     assert rows["proven bound / full map, 97 %", "3"] == (f"{55 / 68:.2f}", "met")
 
 
