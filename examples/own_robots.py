@@ -85,7 +85,7 @@ class MyRobot:
 
 def explore(robots: list[MyRobot], belief: FleetBelief, strategy_name: str, seconds: int) -> float:
     """Let robots explore for some of a mission's 240 seconds; return the share of the areas that is known then."""
-    options = StrategyOptions(delta=0.95, step_s=10.0, horizon_s=240.0, window_steps=None, postpone_below=0.3, seed=0)
+    options = StrategyOptions(delta=0.95, step_s=10.0, horizon_s=240.0, window_steps=None, postpone_below=0.6, seed=0)
     strategy = make_strategy(strategy_name, options)
     by_id = {robot.id: robot for robot in robots}
     for now_s in range(seconds):

@@ -43,7 +43,7 @@ class Explorer:
         blank = OccupancyMap(np.full((rows, cols), 2, np.uint8), RESOLUTION_M)
         self.belief = FleetBelief(blank, (0.0, 0.0, *size_m), CELL_M, list(self.robots.values()))
         options = StrategyOptions(
-            delta=0.95, step_s=10.0, horizon_s=240.0, window_steps=None, postpone_below=0.3, seed=0
+            delta=0.95, step_s=10.0, horizon_s=240.0, window_steps=None, postpone_below=0.6, seed=0
         )
         self.strategy = make_strategy(strategy, options)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
+from rich import box
 from rich.console import Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
@@ -66,19 +67,20 @@ def build_table(instance: OrosInstance) -> RenderableType:
 
 def solvers_table() -> RenderableType:
     """Return the solvers that are installed, with versions and abilities, and how to get the others."""
-    table = Table(pad_edge=False)
-    for heading in ("solver", "version", "warm start", "bound", "keeps incumbents", "work limit counts", "numbers"):
-        table.add_column(heading)
+    table = Table(box=box.SIMPLE, pad_edge=False)
+    for heading in ("solver", "version", "warm\nstart", "bound", "keeps\nplans", "work limit\ncounts", "numbers"):
+        table.add_column(heading, no_wrap=heading in ("solver", "version"))
+    missing = Table.grid(padding=(0, 2))
     for listing in installed():
         able = listing.abilities
         if able is None:
-            table.add_row(listing.name, Text("missing", style="red"), listing.missing)
+            missing.add_row(listing.name, Text("missing", style="red"), listing.missing)
             continue
         table.add_row(
             listing.name, listing.version, _yes(able.warm_start), _yes(able.bound), _yes(able.incumbents),
             able.work_unit or "-", "whole only" if able.integer_only else "any",
         )  # fmt: skip
-    return table
+    return Group(table, missing) if missing.rows else table
 
 
 def _yes(value: bool) -> str:
