@@ -33,7 +33,11 @@ IntArray = NDArray[np.int64]
 ROUNDS = 4
 """A plan is polished and driven so often; each time as much more is wanted of the sample as the simulator missed."""
 
+MORE_ROUNDS = 4
+"""So often again at most where it has missed the share each time: it does where hardly anything may be missing."""
+
 _MARGIN = 0.003  # of the sample, more than the share, to begin with
+_LEFT = 0.3  # of what can be seen beyond the share, no more is wanted in addition: all that is left takes very long
 _SPARE = (0.004, 0.007, 0.002)  # so much more is wanted of routes, in turn: polishing cuts some of it
 _PRICE_S = 4000.0  # for seeing nothing of what is wanted
 _HEAT_S = ((6.0, 0.05), (0.1, 0.01))  # of the routes and of the way points: at the start and at the end
@@ -102,19 +106,23 @@ def best_plan(
     most = _most(view, len(used))
     driven: list[FullMapPlan] = []
     for n in range(restarts):
-        needed = min(most, int(np.ceil((share + _MARGIN) * view.samples)))
-        more = min(most, int(needed + _SPARE[n % len(_SPARE)] * view.samples))
+        needed, more = _wanted(share, n, most, view.samples)
         ways, counts = _routes(view, used, laws, more, steps, seed + n)
-        for k in range(ROUNDS):
+        reached = False
+        for k in range(ROUNDS + MORE_ROUNDS):
+            if k >= ROUNDS and reached:
+                break
             planned = polish(
                 view.space.padded, 1 / view.space.resolution_m, ways, counts, view.ground, laws, view.lattice,
                 needed, max(1, steps // 10), *_HEAT_S[1], seed + n + 1000 * k,
             )  # fmt: skip
             plan, seen = _driven(mission, truth, share, float(planned), ways, counts)
             driven.append(plan)
+            reached = reached or plan.time_s is not None
             # The sample counts squares, the simulator pixels from where the robot is: want as much more as was missing.
-            needed = min(most, max(1, needed + int(np.ceil((share - seen) * view.samples))))
-            if on_progress is not None:
+            missing = int(np.ceil((share - seen) * view.samples)) + (0 if reached else 1 + k)
+            needed = min(most, max(1, needed + missing))
+            if on_progress is not None and k < ROUNDS:
                 on_progress()
     return min(driven, key=lambda plan: (np.inf if plan.time_s is None else plan.time_s, -plan.coverage))
 
@@ -143,6 +151,15 @@ def _most(view: Outlook, robots: int) -> int:
     reached = np.flatnonzero(np.isfinite(view.time_s[n - robots :]).any(axis=0))
     alone = view.seen[reached * (reached + 1) // 2 + reached]
     return int(np.bitwise_count(np.bitwise_or.reduce(alone, axis=0)).sum())
+
+
+def _wanted(share: float, search: int, most: int, samples: int) -> tuple[int, int]:
+    """Return how many sampled pixels are wanted of ways at first, and of the routes they begin with."""
+    lowest = int(np.ceil(share * samples))
+    left = int(_LEFT * max(0, most - lowest))
+    needed = min(most, lowest + min(left, int(np.ceil(_MARGIN * samples))))
+    spare = int(_SPARE[search % len(_SPARE)] * samples)
+    return needed, min(most, needed + min(left, spare))
 
 
 def _routes(
