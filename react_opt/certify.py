@@ -5,6 +5,8 @@ It reads the instance and the plan alone and imports no solver, no model, no tim
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from react_opt.certify_base import Certificate, Violation, instance_rule, shown, slack
 from react_opt.errors import ReactError, UsageError
 from react_opt.instance import AssignmentInstance, InspectionInstance, Instance, OrosInstance
@@ -13,7 +15,9 @@ from react_opt.plan import AssignmentPlan, InspectionPlan, OrosPlan, Plan
 __all__ = ["Certificate", "Violation", "check"]
 
 
-def check(instance: Instance, plan: Plan, bound: bool = False) -> Certificate:
+def check(
+    instance: Instance, plan: Plan, bound: bool = False, on_progress: Callable[[float], None] | None = None
+) -> Certificate:
     """Check a plan against its instance.
 
     Parameters
@@ -24,6 +28,8 @@ def check(instance: Instance, plan: Plan, bound: bool = False) -> Certificate:
         A plan, of this or of any instance.
     bound
         Whether to recompute the bound from the claim's certificate too (OROS only).
+    on_progress
+        Called while the bound is recomputed with the share that is done, from 0 to 1.
 
     Returns
     -------
@@ -46,7 +52,7 @@ def check(instance: Instance, plan: Plan, bound: bool = False) -> Certificate:
         violations, objective = check_oros(instance, plan)
         if not bound:
             return Certificate(violations, objective)
-        broken, value = _check_bound(instance, plan)
+        broken, value = _check_bound(instance, plan, on_progress or (lambda share: None))
         return Certificate(violations + broken, objective, value)
     if bound:
         raise UsageError(f"--bound: plans of kind {plan.kind!r} carry no certificate of their bound")
@@ -61,7 +67,9 @@ def check(instance: Instance, plan: Plan, bound: bool = False) -> Certificate:
     return check_inspection(instance, plan)
 
 
-def _check_bound(instance: OrosInstance, plan: OrosPlan) -> tuple[tuple[Violation, ...], float | None]:
+def _check_bound(
+    instance: OrosInstance, plan: OrosPlan, tell: Callable[[float], None]
+) -> tuple[tuple[Violation, ...], float | None]:
     """Recompute the bound: it may lie below the claimed bound, but not above it."""
     claim = plan.claim
     if claim.bound is None:
@@ -72,7 +80,7 @@ def _check_bound(instance: OrosInstance, plan: OrosPlan) -> tuple[tuple[Violatio
     from react_opt.certify_bound import recompute_bound
 
     try:
-        value = recompute_bound(instance, claim.certificate)
+        value = recompute_bound(instance, claim.certificate, tell)
     except ReactError as error:
         return (Violation("bound", "", None, None, str(error)),), None
     if value > claim.bound + slack(value, claim.bound):

@@ -17,16 +17,18 @@ may be negative.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.certify_bound_best import best_route
 from react_opt.certify_bound_choice import best_of, repriced
 from react_opt.certify_bound_enumerate import worthwhile_routes
-from react_opt.certify_bound_route import Prices, best_route
+from react_opt.certify_bound_route import Prices
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance, OrosRobot
 
@@ -56,7 +58,9 @@ class _Part:
         return _Part(first, last, must)
 
 
-def recompute_bound(instance: OrosInstance, certificate: Mapping[str, Any]) -> float:
+def recompute_bound(
+    instance: OrosInstance, certificate: Mapping[str, Any], tell: Callable[[float], None] = lambda share: None
+) -> float:
     """Return the bound that a certificate proves for an instance.
 
     Parameters
@@ -65,6 +69,8 @@ def recompute_bound(instance: OrosInstance, certificate: Mapping[str, Any]) -> f
         The instance that the certificate is about.
     certificate
         As written by the route decomposition (``claim.certificate``).
+    tell
+        Called now and then with the share of the work that is done, from 0 to 1.
 
     Raises
     ------
@@ -72,12 +78,12 @@ def recompute_bound(instance: OrosInstance, certificate: Mapping[str, Any]) -> f
         If the certificate does not fit the instance or is of an unknown kind.
     """
     try:
-        return _recomputed(instance, certificate)
+        return _recomputed(instance, certificate, tell)
     except (KeyError, TypeError, ValueError, IndexError) as fault:
         raise UsageError(f"the certificate cannot be read: {type(fault).__name__}: {fault}") from fault
 
 
-def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float:
+def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any], tell: Callable[[float], None]) -> float:
     kind = certificate.get("kind")
     if kind not in ("lagrangian", "tree"):
         raise UsageError("the certificate is of an unknown kind; expected 'lagrangian' or 'tree'")
@@ -89,12 +95,18 @@ def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any]) -> float
     )
     memory = _memory(instance, certificate)
     if kind == "lagrangian":
-        return _explored_value(instance) + _rounded(instance, _bound_of(instance, certificate, memory, whole))
-    return _explored_value(instance) + _rounded(instance, _bound_of_tree(instance, certificate["tree"], memory, whole))
+        bound = _bound_of(instance, certificate, memory, whole, tell)
+    else:
+        bound = _bound_of_tree(instance, certificate["tree"], memory, whole, tell)
+    return _explored_value(instance) + _rounded(instance, bound)
 
 
 def _bound_of_tree(
-    instance: OrosInstance, tree: list[Mapping[str, Any]], memory: list[list[int]], whole: _Part
+    instance: OrosInstance,
+    tree: list[Mapping[str, Any]],
+    memory: list[list[int]],
+    whole: _Part,
+    tell: Callable[[float], None],
 ) -> float:
     """Return the largest bound of the leaves; a node's answers stand after it in the list, each asked about once."""
     part_of, worst = {0: whole}, -math.inf
@@ -103,7 +115,8 @@ def _bound_of_tree(
             raise UsageError("the certificate's tree is none: nothing leads to one of its parts")
         part = part_of.pop(place)
         if "cell" not in node:
-            worst = max(worst, _bound_of(instance, node, memory, part))
+            worst = max(worst, _bound_of(instance, node, memory, part, lambda share: None))
+            tell((place + 1) / len(tree))
             continue
         if not 0 <= int(node["cell"]) < len(instance.cells):
             raise UsageError("the certificate's tree asks about a cell that the instance does not have")
@@ -125,16 +138,28 @@ def _explored_value(instance: OrosInstance) -> float:
     )
 
 
-def _bound_of(instance: OrosInstance, leaf: Mapping[str, Any], memory: list[list[int]], part: _Part) -> float:
+def _bound_of(
+    instance: OrosInstance,
+    leaf: Mapping[str, Any],
+    memory: list[list[int]],
+    part: _Part,
+    tell: Callable[[float], None],
+) -> float:
     """Return the bound on the plans of a part that the prices of a leaf prove."""
     prices = _read(instance, leaf, memory, part)
     if leaf.get("enumerated", False):
         return _bound_of_choice(instance, leaf, prices, part)
     total = float(prices.cell.sum()) + sum(prices.cut_price) + prices.rows_worth
-    for group, robot, first, last in _classes(instance, leaf, part):
-        rate = float(group.get("joule_price", 0))
-        total += len(group["robots"]) * best_route(instance, robot, prices, float(group["best"]), rate, first, last)
+    classes = _classes(instance, leaf, part)
+    for done, (group, robot, first, last) in enumerate(classes):
+        best, rate = float(group["best"]), float(group.get("joule_price", 0))
+        share = partial(_tell_part, tell, done, len(classes))
+        total += len(group["robots"]) * best_route(instance, robot, prices, best, rate, first, last, share)
     return total
+
+
+def _tell_part(tell: Callable[[float], None], done: int, parts: int, share: float) -> None:
+    tell((done + share) / parts)
 
 
 def _classes(

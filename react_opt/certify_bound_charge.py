@@ -39,15 +39,20 @@ def charging_of(instance: OrosInstance, robot: OrosRobot) -> Charging | None:
         if charger.slots > 0:
             amount[index[charger.cell]] = charger.power_w * instance.step_s
     idle_j, sense_j = robot.idle_w * instance.step_s, robot.sensing_w * instance.step_s
-    arcs = [(index[arc.from_], index[arc.to], arc.steps, arc.energy_j) for arc in instance.travel]
+    if not amount.any():
+        return None
+    arc_from = np.array([index[arc.from_] for arc in instance.travel], dtype=np.int64)
+    arc_to = np.array([index[arc.to] for arc in instance.travel], dtype=np.int64)
+    steps = np.array([arc.steps for arc in instance.travel], dtype=np.int64)
+    energy_j = np.array([arc.energy_j for arc in instance.travel])
     yet, spent = np.zeros((last + 1, n)), np.zeros((last + 1, n))
     for t in range(last - 1, robot.start_step - 1, -1):
         yet[t] = yet[t + 1] + amount
         spent[t] = spent[t + 1] + idle_j + sense_j
-        for i, j, steps, energy_j in arcs:
-            if t + steps <= last:
-                yet[t, i] = max(yet[t, i], yet[t + steps, j])
-                spent[t, i] = max(spent[t, i], spent[t + steps, j] + energy_j + sense_j)
+        fits = t + steps <= last
+        there = (t + steps[fits], arc_to[fits])
+        np.maximum.at(yet[t], arc_from[fits], yet[there])
+        np.maximum.at(spent[t], arc_from[fits], spent[there] + energy_j[fits] + sense_j)
     if yet[robot.start_step, index[robot.start]] <= 0.0:
         return None
     return Charging(amount, robot.battery_j - robot.capacity_j, yet, robot.battery_j - robot.reserve_j - spent)

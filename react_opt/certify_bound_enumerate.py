@@ -21,6 +21,7 @@ from react_opt.certify_bound_route import (
     Prices,
     States,
     Words,
+    can_run_dry,
     cut_mask,
     distances,
     gains,
@@ -92,7 +93,7 @@ def worthwhile_routes(
     least_j = _least_to_end(instance, robot, moves, end)
     behind = _endings(instance, robot, prices, moves, gain, least_j, floor)
     nearby = _nearby(prices, moves)
-    limited = _can_run_dry(instance, moves, budget, last - robot.start_step)
+    limited = can_run_dry(instance, robot, moves, budget)
     words = (n + 63) // 64
     waiting: list[dict[int, list[_Partial]]] = [{} for _ in range(last + 1)]
     none, zero = np.zeros(1, np.uint64), np.zeros(1)
@@ -323,12 +324,6 @@ def _one_per_set(here: _Partial, limited: bool) -> _Partial:
         else:
             least_j = used_j
     return _take(here, keep)
-
-
-def _can_run_dry(instance: OrosInstance, moves: Moves, budget: float, steps: int) -> bool:
-    """Return whether the battery could limit a robot: moving at the highest power and sensing each cell."""
-    power = max([moves.idle_j, *(energy / d for out in moves.out for _, d, energy in out)])
-    return bool(power * steps + moves.sense_j * min(len(instance.cells), steps + 1) > budget)
 
 
 def _take(here: _Partial, keep: Any) -> _Partial:

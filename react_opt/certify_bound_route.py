@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from react_opt.certify_bound_charge import Charging, charging_of
+from react_opt.certify_bound_charge import Charging
 from react_opt.instance import OrosInstance, OrosRobot
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ Rests = list[tuple[float, Floats]]
 NEVER = -np.inf
 ONE = np.uint64(1)
 MARGIN = 1e-9
-FAR = 12
+UNREACHED = 10**6  # more steps than a horizon has
 
 
 class States(NamedTuple):
@@ -73,143 +73,47 @@ def gains(
     *,
     charges: bool = False,
 ) -> Floats:
-    """Return ``(T + 1, n)``: what sensing is worth after prices; minus infinity where it is out of the question."""
-    n, last = len(instance.cells), instance.horizon_steps
-    gain = np.array([[_gain(instance, prices, robot, i, t, charges) for i in range(n)] for t in range(last + 1)])
-    instant = np.arange(last + 1)[:, None]
-    allowed: Floats = np.where((instant < first) | (instant > last_of), NEVER, gain)
-    return allowed
-
-
-def _gain(instance: OrosInstance, prices: Prices, robot: OrosRobot, cell: int, t: int, charges: bool) -> float:
-    """Return what sensing a cell at an instant is worth after prices; minus infinity where it earns nothing.
+    """Return ``(T + 1, n)``: what sensing is worth after prices; minus infinity where it is out of the question.
 
     A best plan leaves out what costs more than it earns before prices, so that is not priced either; but for a
     robot that charges, which may get for nothing what sensing costs.
     """
-    data = instance.cells[cell]
-    deadline = instance.horizon_steps if data.deadline_step is None else min(data.deadline_step, instance.horizon_steps)
-    if data.explored or t < max(1, robot.start_step) or t > deadline or data.weight <= 0:
-        return NEVER
-    earned = data.weight * (deadline - t + 1) - instance.sigma * robot.sensing_w * instance.step_s
-    if earned <= 0 and not charges:
-        return NEVER
-    return earned - float(prices.cell[cell]) - prices.sense.get(t, 0.0)
-
-
-def best_route(
-    instance: OrosInstance,
-    robot: OrosRobot,
-    prices: Prices,
-    claimed: float,
-    joule_price: float,
-    first: NDArray[np.int64],
-    last_of: NDArray[np.int64],
-) -> float:
-    """Return the most that a robot is worth after prices, or ``claimed`` if it is no more than that.
-
-    Partial routes that cannot end above ``claimed`` by a bound without memory are dropped; if any ends above
-    it the search has found the larger value.
-
-    Parameters
-    ----------
-    instance, robot
-        The instance and one of its robots.
-    prices
-        What the robot pays.
-    claimed
-        What it is said to be worth at most.
-    joule_price
-        Price of a joule at which the battery is relaxed besides; it only speeds up the search.
-    first, last_of
-        ``(n_cells,)`` instants between which it may collect each cell.
-    """
-    n, last = len(instance.cells), instance.horizon_steps
-    index = {cell.id: i for i, cell in enumerate(instance.cells)}
-    moves = moves_of(instance, robot)
-    end = None if robot.return_to is None else index[robot.return_to]
-    budget = robot.battery_j - robot.reserve_j
-    budget += 1e-9 * max(1.0, budget)
-    charging = charging_of(instance, robot)
-    gain = gains(instance, prices, robot, first, last_of, charges=charging is not None)
-    later = np.zeros((last + 2, n))
-    later[: last + 1] = np.maximum.accumulate(np.maximum(gain, 0.0)[::-1])[::-1]
-    ahead = [distances(moves, i, near) for i, near in enumerate(prices.memory)]
-    constant = instance.sigma * robot.battery_j
-    cutoff = claimed - constant
-    rests = rests_of(instance, robot, prices, moves, gain, end, joule_price, charging)
-    full = 0.0 if charging is None else charging.floor
-    waiting: list[dict[int, list[States]]] = [{} for _ in range(last + 1)]
-    stayed: list[dict[int, States]] = [{} for _ in range(last + 1)]  # waited at a charger since the instant before
-    nothing = np.zeros(1, dtype=np.uint64)
-    start = States(np.zeros(1), nothing, nothing, np.zeros(1))
-    waiting[robot.start_step][index[robot.start]] = [start]
-    best = cutoff
-    for t in range(robot.start_step, last + 1):
-        for i, parts in waiting[t].items():
-            states = joined(parts)
-            states = states._replace(value=states.value - prices.stand.get((t, i), 0.0))
-            states = _hopeful(states, t, i, rests, budget, best, full)
-            states = sensed(states, i, gain[t, i], moves.sense_j, prices)
-            if charging is not None and i in stayed[t]:
-                kept = stayed[t][i]._replace(value=stayed[t][i].value - prices.stand.get((t, i), 0.0))
-                kept = sensed(kept, i, gain[t, i], moves.sense_j, prices)
-                kept = _charged(kept, charging, instance.sigma, i, prices.slot.get((t, i), 0.0))
-                states = joined([states, _hopeful(kept, t, i, rests, budget, best, full)])
-            states = _undominated(
-                states,
-                later[np.minimum(t + ahead[i], last + 1), prices.memory[i]],
-                prices,
-                *((moves.sense_j, instance.sigma, charging.yet[t, i], charging.rich[t, i]) if charging else ()),
-            )
-            states = pick(states, states.used_j <= budget)
-            if len(states.value) == 0:
-                continue
-            if t == last:
-                if end is None or end == i:
-                    best = max(best, float(states.value.max()))
-                continue
-            idle = States(
-                states.value - instance.sigma * moves.idle_j, states.memory, states.cuts, states.used_j + moves.idle_j
-            )
-            if charging is not None and charging.amount[i] > 0.0:
-                stayed[t + 1][i] = idle
-                idle = pick(idle, idle.used_j < -np.inf)
-            waiting[t + 1].setdefault(i, []).append(idle)
-            for j, steps, energy in moves.out[i]:
-                if t + steps <= last:
-                    waiting[t + steps].setdefault(j, []).append(
-                        States(
-                            states.value - instance.sigma * energy,
-                            remembered(states.memory, prices.memory[i], prices.memory[j]),
-                            states.cuts & cut_mask(prices, j),
-                            states.used_j + energy,
-                        )
-                    )
-        waiting[t], stayed[t] = {}, {}
-    return best + constant
-
-
-def _charged(states: States, charging: Charging, sigma: float, cell: int, price: float) -> States:
-    """Return states that waited at a charger after charging, and where that has a price, those that do not charge."""
-    credit = np.maximum(0.0, np.minimum(charging.amount[cell], states.used_j - charging.floor))
-    more = states._replace(value=states.value + sigma * credit - price * (credit > 0.0), used_j=states.used_j - credit)
-    return more if price == 0.0 else joined([more, states])
+    last = instance.horizon_steps
+    weight = np.array([0.0 if cell.explored else cell.weight for cell in instance.cells])
+    deadline = np.array(
+        [last if cell.deadline_step is None else min(cell.deadline_step, last) for cell in instance.cells]
+    )
+    instant = np.arange(last + 1)[:, None]
+    earned = weight * (deadline - instant + 1) - instance.sigma * robot.sensing_w * instance.step_s
+    sense = np.zeros(last + 1)
+    sense[list(prices.sense)] = list(prices.sense.values())
+    open_now = (instant >= max(1, robot.start_step)) & (instant <= deadline) & (weight > 0) & ((earned > 0) | charges)
+    open_now &= (instant >= first) & (instant <= last_of)
+    return np.where(open_now, earned - prices.cell - sense[:, None], NEVER)
 
 
 def distances(moves: Moves, cell: int, targets: list[int]) -> NDArray[np.int64]:
     """Return the fewest steps from a cell to others, at least 1 (a cell cannot be sensed anew at once)."""
-    known = {cell: 0}
+    known, missing = {cell: 0}, set(targets)
     queue = [(0, cell)]
-    while queue:
+    while queue and missing:
         distance, i = heapq.heappop(queue)
-        if distance > known[i] or distance > FAR:
+        if distance > known[i]:
             continue
+        missing.discard(i)
         for j, steps, _ in moves.out[i]:
-            if distance + steps < known.get(j, FAR + 1):
+            if distance + steps < known.get(j, UNREACHED):
                 known[j] = distance + steps
                 heapq.heappush(queue, (distance + steps, j))
-    return np.array([max(1, known.get(target, FAR + 1)) for target in targets], dtype=np.int64)
+    return np.array([max(1, known.get(target, UNREACHED)) for target in targets], dtype=np.int64)
+
+
+def can_run_dry(instance: OrosInstance, robot: OrosRobot, moves: Moves, budget: float) -> bool:
+    """Return whether the battery could limit a robot: moving at the highest power and sensing at each instant."""
+    power = max([moves.idle_j, *(energy / d for out in moves.out for _, d, energy in out)])
+    last = instance.horizon_steps
+    senses = min(len(instance.cells), last - max(1, robot.start_step) + 1)
+    return bool(power * (last - robot.start_step) + moves.sense_j * senses > budget)
 
 
 def rests_of(
@@ -273,15 +177,6 @@ def _rest(
     return rest
 
 
-def _hopeful(states: States, t: int, cell: int, rests: Rests, budget: float, best: float, full: float) -> States:
-    """Return the states that may still end above ``best``; ``full`` is the energy used when the battery is full."""
-    keep = np.ones(len(states.value), dtype=bool)
-    for rate, rest in rests:
-        left_j = (budget if rate >= 0.0 else full) - states.used_j
-        keep &= states.value + rest[t, cell] + rate * left_j > best + MARGIN * max(1.0, abs(best))
-    return pick(states, keep & (states.used_j <= budget))
-
-
 def sensed(states: States, cell: int, gain: float, sense_j: float, prices: Prices) -> States:
     """Return the states and, where the cell is not remembered, their twins that collect it."""
     if gain == NEVER:
@@ -317,43 +212,6 @@ def cut_mask(prices: Prices, cell: int) -> np.uint64:
         if cell in cells:
             mask |= 1 << k
     return np.uint64(mask)
-
-
-def _undominated(
-    states: States,
-    later: Floats,
-    prices: Prices,
-    sense_j: float = 0.0,
-    sigma: float = 0.0,
-    yet: float = 0.0,
-    rich: float = -np.inf,
-) -> States:
-    """Return the states that no other beats whatever comes next.
-
-    A state that remembers more, or has more odd cuts, still beats another if it is ahead by all that the other
-    could gain from that: ``later`` is the most that each remembered cell can still earn. Where ``yet`` joules can be
-    charged, the other may make up by them for having less battery, and for sensing what the first leaves out. A state
-    that has used no more than ``rich`` cannot run short, so that it need not have more battery than the other.
-    """
-    order = np.lexsort((states.used_j, -states.value))
-    states = pick(states, order)
-    keep = np.ones(len(order), dtype=bool)
-    for k in range(len(order)):
-        if not keep[k]:
-            continue
-        rest = slice(k + 1, None)
-        lead = states.value[k] - states.value[rest]
-        ahead_j = np.maximum(0.0, states.used_j[rest] - states.used_j[k])
-        for position in np.flatnonzero((states.memory[k] >> np.arange(len(later), dtype=np.uint64)) & ONE):
-            alone = ((states.memory[rest] >> np.uint64(position)) & ONE) == 0
-            lead = lead - later[position] * alone
-            ahead_j = ahead_j + sense_j * alone
-        for cut, price in enumerate(prices.cut_price):
-            if (states.cuts[k] >> np.uint64(cut)) & ONE:
-                lead = lead - price * (((states.cuts[rest] >> np.uint64(cut)) & ONE) == 0)
-        as_full = (states.used_j[k] <= states.used_j[rest]) | (states.used_j[k] <= rich)
-        keep[rest] &= ~((lead >= sigma * np.minimum(ahead_j, yet)) & as_full)
-    return pick(states, keep)
 
 
 def pick(states: States, keep: NDArray[np.bool_] | NDArray[np.int64]) -> States:

@@ -217,6 +217,7 @@ def check(
     """
     from react_opt.certify import check as check_plan
     from react_opt.jsonio import load
+    from react_opt.report.live import share_bar
 
     if instance_file == plan_file == "-":
         raise UsageError("PLAN: standard input is the instance already")
@@ -227,7 +228,8 @@ def check(
     instance = _instance(document, instance_file)
     if not plan.kind.endswith("_plan"):
         raise InputError.single(plan_file, "kind", f"expected a plan, found {plan.kind!r}")
-    certificate = check_plan(instance, plan, bound=bound)
+    with share_bar("recomputing the bound") if bound else contextlib.nullcontext() as progress:
+        certificate = check_plan(instance, plan, bound=bound, on_progress=progress)
     for violation in certificate.violations:
         print(f"{plan_file}: {violation}")
     if certificate.ok:

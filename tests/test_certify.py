@@ -309,7 +309,7 @@ def test_the_recomputed_bound_may_not_be_above_the_claimed_one(
     proven: float, rules: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     part = types.ModuleType("react_opt.certify_bound")
-    part.recompute_bound = lambda instance, certificate: certificate["value"]  # type: ignore[attr-defined]
+    part.recompute_bound = lambda instance, certificate, tell: certificate["value"]  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "react_opt.certify_bound", part)
     found = check(*bound_case({"value": proven}), bound=True)
     assert {violation.rule for violation in found.violations} == rules
@@ -317,7 +317,7 @@ def test_the_recomputed_bound_may_not_be_above_the_claimed_one(
 
 
 def test_a_certificate_that_makes_no_sense_is_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(instance: Any, certificate: Any) -> float:
+    def refuse(instance: Any, certificate: Any, tell: Any) -> float:
         raise InputError.single("<data>", "claim.certificate.prices", "required, but missing")
 
     part = types.ModuleType("react_opt.certify_bound")

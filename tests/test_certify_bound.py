@@ -78,6 +78,24 @@ def test_any_prices_give_a_bound() -> None:
         assert recompute_bound(instance, changed) >= result.objective - 1e-9
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("battery_j", [5000.0, 420.0])
+def test_without_prices_and_with_all_cells_remembered_one_robot_is_bounded_by_its_optimum(
+    seed: int, battery_j: float
+) -> None:
+    """Then the programme is exact; progress is told in rising shares up to the whole."""
+    data = _instance(seed, battery_j)
+    instance = data.model_copy(update={"robots": data.robots[:1]})
+    result = solve_routes(route_problem(instance), work_limit=2000)
+    nothing = {"cell_price": [0.0] * 6, "classes": [{"robots": [0], "best": 0.0}], "cuts": [], "rows": []}
+    shares: list[float] = []
+    bound = recompute_bound(instance, {"kind": "lagrangian", "bound": 0.0, "memory": "all", **nothing}, shares.append)
+    assert result.status == "optimal"
+    assert bound == pytest.approx(result.objective, rel=1e-8)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
 def _walled(seed: int) -> OrosInstance:
     """A grid of weighted cells for two or three robots; on odd seeds the batteries bind."""
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from rich.console import Console
 from rich.live import Live
-from rich.progress import BarColumn, Progress
+from rich.progress import BarColumn, Progress, TimeElapsedColumn
 from rich.text import Text
 
 from react_opt.plan import gap_of
@@ -46,3 +46,16 @@ def mission_bar(horizon_s: float) -> Iterator[Callable[[float, float], None] | N
             bar.update(task, completed=t_s, description=f"known {coverage:6.1%}")
 
         yield show
+
+
+@contextlib.contextmanager
+def share_bar(what: str) -> Iterator[Callable[[float], None] | None]:
+    """Yield a progress callback of the share that is done, from 0 to 1; None where nobody watches."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    columns = ("{task.description}", BarColumn(), "{task.percentage:3.0f} %", TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(what, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
