@@ -86,14 +86,14 @@ class Finish:
                 max_labels=most_labels,
             )
             standing.budget.spend()
-            if routes is None or sum(len(one.label) for one in (*found, routes)) > MOST_ROUTES:
+            if routes is None or sum(len(one.value) for one in (*found, routes)) > MOST_ROUTES:
                 self._hopeless_gap = self._hopeless_gap if anew else EASIER * gap
                 return None
             found.append(routes)
         finished, complete = self._choose(found, duals, gap)
         if not complete:
             self._hopeless_gap = self._hopeless_gap if anew else EASIER * gap
-        self.routes += sum(len(one.label) for one in found)
+        self.routes += sum(len(one.value) for one in found)
         return finished._replace(bound=max(finished.bound, floor))
 
     def _choose(self, found: list[Enumerated], duals: Duals, gap: float) -> tuple[Finished, bool]:
@@ -105,7 +105,7 @@ class Finish:
         region = self.generation.side.region
         must = np.zeros(len(duals.cell), np.bool_) if region is None else region.must
         loss = np.concatenate([duals.group[k] - one.reduced for k, one in enumerate(found)])
-        group = np.concatenate([np.full(len(one.label), k, np.int64) for k, one in enumerate(found)])
+        group = np.concatenate([np.full(len(one.value), k, np.int64) for k, one in enumerate(found)])
         value, sets = np.concatenate([one.value for one in found]), np.concatenate([one.sets for one in found])
         order = np.argsort(loss, kind="stable")
         pool, price, program = Pool(value[order], loss[order], group[order], sets[order]), duals.cell, None
@@ -140,7 +140,7 @@ class Finish:
         standing.budget.spend()
         if best[0] >= 0:
             columns = [
-                pricer.column(k, found[k].labels, int(found[k].label[np.all(found[k].sets == sets, axis=1)][0]))
+                found[k].column(pricer, k, sets)
                 for k, sets in zip(pool.group[best].tolist(), pool.sets[best], strict=True)
             ]
             columns.sort(key=lambda column: column.group)

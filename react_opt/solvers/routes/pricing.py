@@ -21,7 +21,7 @@ from react_opt.solvers.routes.routecolumn import route_column
 
 MAX_LABELS = 20_000_000
 COARSE_SIZE = 8
-BACKWARD_LABELS = 100_000
+SHORT_LABELS = 100_000
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,28 @@ class SidePrices:
 
 
 NO_SIDE_PRICES = SidePrices()
+
+
+@dataclass(frozen=True)
+class Endings:
+    """What bounds the beginnings and the rests of the routes of a class, the former first in each pair.
+
+    Parameters
+    ----------
+    prices, fuel, bound
+        Prices, battery, and flat bound on what is missing to a whole route.
+    beginnings, rests
+        Labels of both directions with little memory: rests bound beginnings, and the other way round.
+    cutoff
+        Least value of interest.
+    """
+
+    prices: tuple[Prices, Prices]
+    fuel: tuple[Fuel, Fuel]
+    bound: tuple[FloatArray, FloatArray]
+    beginnings: Labels
+    rests: Labels
+    cutoff: float
 
 
 class RoutePricer:
@@ -84,7 +106,7 @@ class RoutePricer:
         there = np.where(cell_of >= 0, memory.steps[place, cell_of], 0).astype(np.int32)
         back = np.where(cell_of >= 0, memory.steps[cell_of, place], 0).astype(np.int32)
         into, out = self._in_arcs, self._out_arcs
-        coarse = keep & memory.kept(problem.arc_from, problem.arc_to, COARSE_SIZE)
+        self._coarse = coarse = keep & memory.kept(problem.arc_from, problem.arc_to, COARSE_SIZE)
         self.forward = Graph(
             self._in_start,
             problem.arc_from[into],
@@ -198,17 +220,9 @@ class RoutePricer:
         return Priced(found, best if exact else None, tops)
 
     def endings(
-        self,
-        group: int,
-        duals: Duals,
-        floor: float,
-        side: SidePrices,
-        cuts: Sequence[Rank1Cut],
-    ) -> tuple[Prices, Fuel, FloatArray, Labels | None, float]:
-        """Return what bounds every single label of a class that collects something more.
-
-        Prices, battery, flat bound, labels from the last collection of a route backwards, and cutoff. The labels are
-        None if there are too many.
+        self, group: int, duals: Duals, floor: float, side: SidePrices, cuts: Sequence[Rank1Cut]
+    ) -> Endings | None:
+        """Return what bounds every single label of a class that collects something more; None if that is too much.
 
         Parameters
         ----------
@@ -221,41 +235,63 @@ class RoutePricer:
         cutoff = floor - self._constant(group)
         fuel, bound = self.rests.bound(group, back, onwards=True, collects=True)
         spent, past = self.rests.bound(group, ahead, onwards=False)
-        for prices in (back, back._replace(cut_of=np.zeros_like(back.cut_of))):
-            # without the cuts the labels from the horizon are fewer and bound less sharply
+        rests = self._short(self.backward, back, spent, self.rests.last[group], True, past, cutoff)
+        coarse = self.forward._replace(in_keep=self._coarse[self._in_arcs])
+        beginnings = self._short(coarse, ahead, fuel, self.rests.begin[group], False, bound, cutoff)
+        if rests is None or beginnings is None:
+            return None
+        return Endings((ahead, back), (fuel, spent), (bound, past), beginnings, rests, cutoff)
+
+    def _short(
+        self,
+        graph: Graph,
+        prices: Prices,
+        fuel: Fuel,
+        origin: FloatArray,
+        collects_first: bool,
+        completion: FloatArray,
+        cutoff: float,
+    ) -> Labels | None:
+        """Return labels of one direction that remember little; without the cuts if they are too many with them."""
+        for priced in (prices, prices._replace(cut_of=np.zeros_like(prices.cut_of))):
+            # without the cuts the labels are fewer and bound less sharply
             labels, complete = grow_labels(
-                self.backward,
-                prices,
-                spent,
-                self.rests.last[group],
-                True,
-                past,
-                self._no_labels,
-                cutoff,
-                MAX_LABELS,
-                BACKWARD_LABELS,
-                False,
-                self.stop,
-            )
+                graph, priced, fuel, origin, collects_first, completion, self._no_labels, cutoff, MAX_LABELS,
+                SHORT_LABELS, False, self.stop,
+            )  # fmt: skip
             if complete:
-                return ahead, fuel, bound, labels, cutoff
-        return ahead, fuel, bound, None, cutoff
+                return labels
+        return None
 
     @property
     def joule_prices(self) -> list[float]:
         """Price of a joule for each class, from the last call; 0 where the battery cannot bind."""
         return [self._charging[k].rate if k in self._charging else p for k, p in enumerate(self.rests.joule_prices)]
 
-    def column(self, group: int, labels: Labels, label: int) -> Column:
-        """Return the route of a label, which after the label's instant ends with the least energy."""
+    def column(self, group: int, labels: Labels, label: int, rest: tuple[int, Labels, int] | None = None) -> Column:
+        """Return the route of a label, which after its last collection ends with the least energy.
+
+        Parameters
+        ----------
+        group, labels, label
+            Its class and the label.
+        rest
+            How it goes on: the arc taken from the label, labels that grow backwards, and which of them.
+        """
         problem, data = self.problem, self.problem.classes[group]
-        node = int(np.searchsorted(labels.start, label, side="right")) - 1
-        tau, cell = divmod(node, problem.n_cells)
-        cells, arcs, senses = trace(labels, problem.arc_from, problem.arc_steps, label, cell, tau)
-        rest = problem.horizon - tau
-        cells = np.concatenate((cells, np.full(rest, -1)))
-        arcs = np.concatenate((arcs, np.full(rest, -1)))
-        senses = np.concatenate((senses, np.zeros(rest, np.bool_)))
+        tau, cell = _node(labels, label, problem.n_cells)
+        whole = trace(labels, problem.arc_from, problem.arc_steps, label, cell, tau)
+        cells, arcs, senses = (np.concatenate((part, np.zeros(problem.horizon - tau, part.dtype))) for part in whole)
+        cells[tau + 1 :], arcs[tau + 1 :] = -1, -1
+        if rest is not None:
+            arcs[tau], back, label = rest
+            past, cell = _node(back, label, problem.n_cells)
+            back_cells, back_arcs, back_senses = trace(back, problem.arc_to, problem.arc_steps, label, cell, past)
+            at = np.flatnonzero(back_cells >= 0)
+            cells[problem.horizon - at], senses[problem.horizon - at] = back_cells[at], back_senses[at]
+            taken = back_arcs[at[:-1]]  # from there on the arcs lead forwards again
+            arcs[problem.horizon - at[1:]] = taken
+            tau, cell = problem.horizon - int(at[0]), int(back_cells[at[0]])
         least = self.rests.fuel[group][0].least
         while tau < problem.horizon:
             ways = [(least[tau + 1, cell] + data.wait_j, tau + 1, cell, -1)]
@@ -298,3 +334,8 @@ class RoutePricer:
         price = np.zeros(64)
         price[: len(cut_price)] = cut_price
         return cut_of, cut_keep, price
+
+
+def _node(labels: Labels, label: int, n_cells: int) -> tuple[int, int]:
+    """Return instant and cell of a label in kernel time."""
+    return divmod(int(np.searchsorted(labels.start, label, side="right")) - 1, n_cells)

@@ -44,8 +44,8 @@ def test_the_best_route_of_every_set_that_loses_little_is_enumerated(seed: int) 
         got = dict(zip(found.sets[:, 0].tolist(), found.value.tolist(), strict=True))
         wanted = {known: worth for known, worth in every.items() if reduced[known] >= floor}
         assert got == pytest.approx(wanted)
-        for known, label in zip(found.sets[:, 0].tolist(), found.label.tolist(), strict=True):
-            column = pricer.column(k, found.labels, label)
+        for known, one in zip(found.sets[:, 0].tolist(), found.sets, strict=True):
+            column = found.column(pricer, k, one)
             assert sorted(column.cells) == cells[known]
             assert column.value == pytest.approx(wanted[known])
 
