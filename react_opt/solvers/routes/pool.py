@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from react_opt.route_problem import FloatArray, IntArray
@@ -22,8 +21,10 @@ from react_opt.solvers.routes.labelstore import MaskArray
 from react_opt.solvers.routes.master import Master, MasterPoint
 from react_opt.solvers.routes.region import everything
 from react_opt.solvers.routes.setcuts import Bits, SetCut, separate_sets
+from react_opt.solvers.routes.setprices import cost_of_sets
 
 FIRST_COLUMNS, COLUMNS = 400, 60
+ACTIVE = 20_000  # routes that are priced each time; all others only when these do not help any more
 SMOOTHING = 0.6
 EARLY = 0.03  # part of what the programme lies above the incumbent
 MOST_CUTS, CUTS_AT_ONCE = 200, 40
@@ -80,13 +81,12 @@ class PoolProgram:
         n = len(first.cell)
         self.pool, self.must, self._standing = pool, must, standing
         self._counts = np.array(counts, dtype=np.int64)
-        self._inside = inside_of(pool.sets, n)
-        self._rows = sp.csr_matrix(self._inside, dtype=np.float64)
         self._master = Master(n, counts, 2.0 * float(np.abs(pool.value).max()) * (1 + sum(counts)) + 1.0)
         self._master.restrict(replace(everything(len(counts), n, 0), must=must))
         self._route: dict[Column, int] = {}  # of each column of the master
         self._add(np.arange(min(FIRST_COLUMNS, len(pool.value))))
-        self._add_cuts(first.cuts)
+        self._master.add_cuts(first.cuts)
+        self._active = self._first()
         self._stalled = 0
         self.prices = first
         self.stages: list[PoolPrices] = []  # prices at which routes were dropped
@@ -107,7 +107,7 @@ class PoolProgram:
             self._drop(self.prices.bound - floor + 1e-7 * max(1.0, abs(floor)))
             return False
         used = np.flatnonzero(point.use > TINY)
-        inside = np.zeros((len(used), self._inside.shape[1]), dtype=np.uint8)
+        inside = np.zeros((len(used), len(self.must)), dtype=np.uint8)
         for row, k in enumerate(used.tolist()):
             inside[row, list(self._master.columns[k].cells)] = 1
         gap = self.prices.bound - floor
@@ -121,18 +121,42 @@ class PoolProgram:
             # what routes lose is counted at the best prices, so the cuts that have one there stay
             best: dict[object, float] = dict(zip(self.cuts, self._extended()[1].tolist(), strict=True))
             idle = {cut for cut in self._master.cuts if priced[cut] <= TINY and best.get(cut, 0.0) <= 0.0}
-            kept = np.flatnonzero([cut not in idle for cut in self._master.cuts])
-            n = self._inside.shape[1]
-            self._rows = self._rows[:, np.concatenate((np.arange(n), n + kept))]
             self._master.drop_cuts(lambda cut: cut in idle)
-        self._add_cuts(cuts[: max(0, MOST_CUTS - len(self._master.cuts))])
+        self._master.add_cuts(cuts[: max(0, MOST_CUTS - len(self._master.cuts))])
         return bool(cuts)
 
     def _converge(self) -> MasterPoint | None:
-        """Solve the linear programme over all routes; None at a limit."""
+        """Solve the linear programme over all routes, those of least loss first; None at a limit."""
+        while True:
+            found = self._converge_over(self._active)
+            if found is None:
+                return None
+            point, cell, cut, closed = found
+            if len(self._active) == len(self.pool.value):
+                return point
+            reduced = self._look(cell, cut, self.prices.bound)
+            if closed or self.prices.bound - point.value <= self._precision(point):
+                return point
+            top = np.full(len(self._counts), -np.inf)
+            np.maximum.at(top, self.pool.group[self._active], reduced[self._active])
+            better = reduced - top[self.pool.group]
+            more = np.argpartition(-better, min(ACTIVE, len(better)) - 1)[:ACTIVE]
+            more = np.setdiff1d(more[better[more] > 0.0], self._active)
+            if len(more) == 0:
+                return point
+            self._active = np.concatenate((self._active, more))
+
+    def _precision(self, point: MasterPoint) -> float:
+        """How far a bound may lie above the linear programme."""
         floor = self._standing.objective
-        centre_cell, centre_cut = self._extended()
-        smoothing = SMOOTHING
+        return max(1e-8 * max(1.0, abs(point.value)), EARLY * (0.0 if floor is None else point.value - floor))
+
+    def _converge_over(self, active: IntArray) -> tuple[MasterPoint, FloatArray, FloatArray, bool] | None:
+        """Solve the linear programme over some routes; its point, the best prices, and whether they prove the plan."""
+        whole, best = len(active) == len(self.pool.value), np.inf
+        best_cell, best_cut = self._extended()
+        centre_cell, centre_cut, smoothing = best_cell, best_cut, SMOOTHING
+        group = self.pool.group[active]
         while not self._standing.budget.over():
             point = self._master.solve(self._standing.budget.left_s())
             self._standing.budget.spend()
@@ -140,21 +164,26 @@ class PoolProgram:
                 return None
             cell = smoothing * centre_cell + (1.0 - smoothing) * point.duals.cell
             cut = smoothing * centre_cut + (1.0 - smoothing) * point.duals.cut
-            before = self.prices.bound
-            reduced = self._look(cell, cut, before)
-            if self.prices.bound < before:
+            if whole:
+                best = self.prices.bound
+                reduced = self._look(cell, cut, best)
+                bound = self.prices.bound
+            else:
+                reduced = self._reduced(cell, cut, active)
+                bound = min(best, self._bound(cell, cut, reduced, group)[0])
+            if bound < best:
+                best, best_cell, best_cut = bound, cell, cut
                 centre_cell, centre_cut = cell, cut
-            above = 0.0 if floor is None else point.value - floor
-            if self.prices.bound - point.value <= max(1e-8 * max(1.0, abs(point.value)), EARLY * above):
-                return point
-            if floor is not None and self._standing.proven(self.prices.bound):
-                return point
-            true = reduced if smoothing == 0.0 else self._reduced(point.duals.cell, point.duals.cut)
-            true = true - point.duals.group[self.pool.group]
-            best = np.argpartition(-true, min(COLUMNS, len(true)) - 1)[:COLUMNS]
-            if self._add(best[true[best] > 1e-9 * max(1.0, abs(point.value))]) == 0:
+            if whole and self._standing.proven(self.prices.bound):
+                return point, best_cell, best_cut, True
+            if bound - point.value <= self._precision(point):
+                return point, best_cell, best_cut, False
+            true = reduced if smoothing == 0.0 else self._reduced(point.duals.cell, point.duals.cut, active)
+            true = true - point.duals.group[group]
+            first = np.argpartition(-true, min(COLUMNS, len(true)) - 1)[:COLUMNS]
+            if self._add(active[first[true[first] > 1e-9 * max(1.0, abs(point.value))]]) == 0:
                 if smoothing == 0.0:
-                    return point
+                    return point, best_cell, best_cut, False
                 smoothing = 0.0
             else:
                 smoothing = SMOOTHING
@@ -163,16 +192,33 @@ class PoolProgram:
     def _look(self, cell: FloatArray, cut: FloatArray, known: float) -> FloatArray:
         """Return value minus prices of all routes; keep the prices if their bound is less than the known one."""
         reduced = self._reduced(cell, cut)
-        best = np.full(len(self._counts), -np.inf)
-        np.maximum.at(best, self.pool.group, reduced)
-        rhs = np.array([one.rhs for one in self._master.cuts])
-        bound = float(cell.sum()) + float(cut @ rhs) + float(self._counts @ best)
+        bound, best = self._bound(cell, cut, reduced, self.pool.group)
         if bound < known:
             self.prices = PoolPrices(bound, cell, best, self.cuts, cut)
         return reduced
 
-    def _reduced(self, cell: FloatArray, cut: FloatArray) -> FloatArray:
-        reduced: FloatArray = self.pool.value - self._rows @ np.concatenate((cell, cut))
+    def _bound(
+        self, cell: FloatArray, cut: FloatArray, reduced: FloatArray, group: IntArray
+    ) -> tuple[float, FloatArray]:
+        """Return the bound on the plans of some routes, and the most that one of each class is worth after prices."""
+        best = np.full(len(self._counts), -np.inf)
+        np.maximum.at(best, group, reduced)
+        rhs = np.array([one.rhs for one in self._master.cuts])
+        return float(cell.sum()) + float(cut @ rhs) + float(self._counts @ best), best
+
+    def _reduced(self, cell: FloatArray, cut: FloatArray, active: IntArray | None = None) -> FloatArray:
+        """Return value minus prices of some routes, all by default."""
+        value, sets = self.pool.value, self.pool.sets
+        if active is not None and len(active) < len(value):
+            value, sets = value[active], sets[active]
+        priced = np.flatnonzero(cut > 0.0)
+        cuts = [self.cuts[k] for k in priced.tolist()]
+        shape = (len(cuts), max([len(one.cells) for one in cuts], default=1))
+        cells, times = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+        for row, one in enumerate(cuts):
+            cells[row, : len(one.cells)], times[row, : len(one.cells)] = one.cells, one.times
+        over = np.array([one.over for one in cuts], dtype=np.int64)
+        reduced: FloatArray = value - cost_of_sets(sets, cell, cells, times, over, cut[priced])
         return reduced
 
     def loss(self) -> FloatArray:
@@ -186,20 +232,20 @@ class PoolProgram:
         price = dict(zip(self.prices.cuts, self.prices.price.tolist(), strict=True))
         return self.prices.cell, np.array([price.get(cut, 0.0) for cut in self.cuts])
 
+    def _first(self) -> IntArray:
+        """Return the routes that lose least, and at least one of each class."""
+        best = np.unique(self.pool.group, return_index=True)[1]
+        return np.union1d(best, np.arange(min(ACTIVE, len(self.pool.group))))
+
     def _add(self, routes: IntArray) -> int:
         """Add routes to the master; return how many are new."""
         columns = []
-        for r in routes.tolist():
-            cells = tuple(np.flatnonzero(self._inside[r]).tolist())
+        for r, inside in zip(routes.tolist(), inside_of(self.pool.sets[routes], len(self.must)), strict=True):
+            cells = tuple(np.flatnonzero(inside).tolist())
             column = Column(int(self.pool.group[r]), float(self.pool.value[r]), cells, None, (0,) * len(cells))
             self._route[column] = r
             columns.append(column)
         return self._master.add(columns)
-
-    def _add_cuts(self, cuts: Sequence[SetCut]) -> None:
-        self._master.add_cuts(cuts)
-        more = [sp.csr_matrix(cut.coefficients(self._inside)[:, None].astype(np.float64)) for cut in cuts]
-        self._rows = sp.hstack([self._rows, *more], format="csr") if more else self._rows
 
     def _drop(self, most: float) -> None:
         """Leave out the routes that lose more than ``most`` at the best prices."""
@@ -208,7 +254,7 @@ class PoolProgram:
         keep = np.flatnonzero(loss <= most)
         keep = keep[np.argsort(loss[keep], kind="stable")]
         self.pool = Pool(self.pool.value[keep], loss[keep], self.pool.group[keep], self.pool.sets[keep])
-        self._inside, self._rows = self._inside[keep], self._rows[keep]
+        self._active = self._first()
         now = np.full(len(loss), -1)
         now[keep] = np.arange(len(keep))
         self._route = {column: int(now[r]) for column, r in self._route.items() if now[r] >= 0}
@@ -217,4 +263,5 @@ class PoolProgram:
 
 def inside_of(sets: MaskArray, n_cells: int) -> Bits:
     """Return ``(m, n_cells)`` 0 or 1: the cells of sets that hold 64 to a word."""
-    return np.unpackbits(np.ascontiguousarray(sets).view(np.uint8), axis=1, bitorder="little")[:, :n_cells]
+    words = np.ascontiguousarray(sets).view(np.uint8).reshape(len(sets), 8 * sets.shape[1])
+    return np.unpackbits(words, axis=1, bitorder="little")[:, :n_cells]
