@@ -99,7 +99,7 @@ class _Proof:
         self.master = Master(problem.n_cells, self.counts, 2.0 * most + 1.0, threads)
         self.generation = Generation(self.master, self.pricer, standing)
         self.tightening = Tightening(self.generation, self.memory)
-        self.finish = Finish(self.generation, standing)
+        self.finish = Finish(self.generation, standing, threads)
         self.notes: list[str] = []
         self.proof: dict[str, Any] = {}
         self._searches = 0

@@ -18,9 +18,7 @@ from react_opt.solvers.routes.pool import PoolPrices, PoolProgram
 from react_opt.solvers.routes.setcuts import SetCut
 
 EASIER = 0.7  # share of the last hopeless gap at which it is tried again
-LEAST_LABELS, MOST_LABELS = 1_000_000, 8_000_000  # of the enumeration of one class
-LABELS_PER_LABEL = 3  # in between: as many times the labels of all pricings so far, which are dearer
-MOST_ROUTES = 500_000
+LEAST, MOST = 200_000, 1_500_000  # labels of each direction, and routes; in between as many as labels priced so far
 FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choosing among them, at most about a second
 
 
@@ -40,10 +38,12 @@ class Finish:
         The column generation with its region.
     standing
         The best plan so far and the limits.
+    threads
+        Threads to use.
     """
 
-    def __init__(self, generation: Generation, standing: Standing) -> None:
-        self.generation, self.standing = generation, standing
+    def __init__(self, generation: Generation, standing: Standing, threads: int = 1) -> None:
+        self.generation, self.standing, self.threads = generation, standing, threads
         problem = generation.pricer.problem
         # with limits between robots a worse route with the same cells can be of use; chargers are not enumerated
         self._coupled = (
@@ -72,7 +72,7 @@ class Finish:
         if gap > self._hopeless_gap and not anew:
             return None
         pricer, floor = self.generation.pricer, standing.objective
-        most_labels = min(MOST_LABELS, max(LEAST_LABELS, LABELS_PER_LABEL * pricer.labels))
+        most = min(MOST, max(LEAST, pricer.labels))
         duals = self.generation.extended(best)
         found: list[Enumerated] = []
         for group in range(len(master.counts)):
@@ -83,10 +83,12 @@ class Finish:
                 float(duals.group[group]) - gap,
                 self.generation.side,
                 master.cuts,
-                max_labels=most_labels,
+                max_labels=most,
+                max_routes=most - sum(len(one.value) for one in found),
+                threads=self.threads,
             )
             standing.budget.spend()
-            if routes is None or sum(len(one.value) for one in (*found, routes)) > MOST_ROUTES:
+            if routes is None:
                 self._hopeless_gap = self._hopeless_gap if anew else EASIER * gap
                 return None
             found.append(routes)
