@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -29,13 +30,33 @@ from react_opt.solvers.routes.smoothing import MOST_WEIGHTS, SmoothedDual
 
 BEAM = 2
 FIRST_BITS = 4  # cells remembered in one place by the smoothed dual at first
-HOT, COLD = 0.02, 0.001  # temperatures as shares of what a cell earns at best, on average
-ITERATIONS = 60  # of the quasi-Newton method at one temperature
 PRECISION = 1e-7  # relative change of the smoothed bound at which it ends
 SAMPLE = 300  # routes drawn to look for cycles
-ROUNDS = 8  # of growing memory
 BETWEEN = 20  # iterations between two exact pricings
 WORTH_IT = 1e-4  # relative change of the bound below which the memory is not grown once more
+
+
+class Effort(NamedTuple):
+    """How far the smoothed dual is minimised.
+
+    Parameters
+    ----------
+    hot, cold
+        First and last temperature as shares of what a cell earns at best, on average.
+    iterations
+        Of the quasi-Newton method at one temperature.
+    rounds
+        Of growing memory.
+    """
+
+    hot: float
+    cold: float
+    iterations: int
+    rounds: int
+
+
+WHOLE = Effort(0.02, 0.001, 60, 8)
+BRIEF = Effort(0.01, 0.005, 15, 1)  # where the linear programme converges well, once it has prices to begin with
 
 
 class _Stopped(Exception):
@@ -55,10 +76,14 @@ class DualAscent:
         Seed of the routes drawn.
     threads
         Robot classes that are priced at once.
+    effort
+        How far `smooth` goes.
     """
 
-    def __init__(self, generation: Generation, memory: Memory, seed: int, threads: int = 1) -> None:
-        self.generation, self.memory = generation, memory
+    def __init__(
+        self, generation: Generation, memory: Memory, seed: int, threads: int = 1, effort: Effort = WHOLE
+    ) -> None:
+        self.generation, self.memory, self.effort = generation, memory, effort
         self.threads = max(1, min(threads, len(generation.master.counts)))
         self.master, self.standing = generation.master, generation.standing
         self.problem = generation.pricer.problem
@@ -85,14 +110,14 @@ class DualAscent:
         )
         reward = self.problem.reward.max(axis=1, initial=0.0)
         scale = float(np.mean(reward[reward > 0.0])) if reward.any() else 1.0
-        cell, temperature = self.best.duals.cell, HOT * scale
+        cell, temperature = self.best.duals.cell, self.effort.hot * scale
         while not self.standing.done():
             cell = self._descend(smooth, cell, temperature)
             self._evaluate(cell)
-            if temperature <= COLD * scale:
+            if temperature <= self.effort.cold * scale:
                 break
-            temperature = max(0.5 * temperature, COLD * scale)
-        for _ in range(ROUNDS):
+            temperature = max(0.5 * temperature, self.effort.cold * scale)
+        for _ in range(self.effort.rounds):
             if self.standing.done():
                 return
             before = self.best.bound
@@ -134,7 +159,7 @@ class DualAscent:
         def watch(prices: FloatArray) -> None:
             nonlocal reached, count
             reached, count = prices.copy(), count + 1
-            if count % BETWEEN == 0 and count < ITERATIONS:
+            if count % BETWEEN == 0 and count < self.effort.iterations:
                 self._evaluate(np.maximum(0.0, reached))
             left_s = self.standing.budget.left_s()
             if left_s is not None and left_s < 3.0 * self._pricing_s:  # what is reached has to be priced yet
@@ -143,7 +168,7 @@ class DualAscent:
         with suppress(_Stopped):
             minimize(
                 value, cell, jac=True, method="L-BFGS-B", bounds=[(0.0, None)] * len(cell), callback=watch,
-                options={"maxiter": ITERATIONS, "maxcor": 50, "ftol": PRECISION},
+                options={"maxiter": self.effort.iterations, "maxcor": 50, "ftol": PRECISION},
             )  # fmt: skip
         return np.maximum(0.0, reached)
 

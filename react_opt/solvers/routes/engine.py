@@ -13,7 +13,7 @@ from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes.background import beside
 from react_opt.solvers.routes.budget import Budget, OnProgress, Standing, stopping
 from react_opt.solvers.routes.certificate import certificate, tree_certificate
-from react_opt.solvers.routes.dual_ascent import DualAscent
+from react_opt.solvers.routes.dual_ascent import BRIEF, WHOLE, DualAscent
 from react_opt.solvers.routes.finish import Finish
 from react_opt.solvers.routes.generation import Generation
 from react_opt.solvers.routes.greedy import greedy
@@ -27,7 +27,8 @@ from react_opt.solvers.routes.tightening import Tightening
 from react_opt.solvers.routes.tree import Tree
 
 FIRST_MEMORY = 8
-MANY_CELLS, MANY_PLACES = 45, 4_000  # cells, cells times instants from which on prices are smoothed first
+SOME_CELLS, SOME_PLACES = 30, 1_000  # cells, cells times instants from which on prices are smoothed briefly first
+MANY_CELLS, MANY_PLACES = 45, 4_000  # and from which on until it does not pay any more
 PRIMAL_SHARE = 0.05
 WORTH_IT, PATIENCE = 0.05, 2  # share of the gap that tightening has to close, and how often it may fail to
 FIRST_SEARCH_S = 0.002  # per cell
@@ -107,8 +108,9 @@ class _Proof:
     def run(self) -> None:
         """Go on until the plan is proven or a limit is reached."""
         budget = self.standing.budget
-        ascent = DualAscent(self.generation, self.memory, self.seed, self.threads)
         many = self.problem.n_cells >= MANY_CELLS and self.problem.reward.size >= MANY_PLACES
+        some = self.problem.n_cells >= SOME_CELLS and self.problem.reward.size >= SOME_PLACES
+        ascent = DualAscent(self.generation, self.memory, self.seed, self.threads, WHOLE if many else BRIEF)
         if many:  # a bound first; what searches beside the proof has time enough
             ascent.slots()
             self._keep_certificate()
@@ -121,10 +123,10 @@ class _Proof:
             self.master.add([route_column(self.problem, route) for route in self.standing.routes])
         if self.standing.done():
             return
-        if many:
-            ascent.smooth()
-        else:
+        if not many:
             ascent.slots()
+        if some:
+            ascent.smooth()
         self._keep_certificate()
         if self._tighten():
             self._branch()
