@@ -110,6 +110,7 @@ class _Proof:
         budget = self.standing.budget
         many = self.problem.n_cells >= MANY_CELLS and self.problem.reward.size >= MANY_PLACES
         some = self.problem.n_cells >= SOME_CELLS and self.problem.reward.size >= SOME_PLACES
+        some = many or (some and self.problem.n_robots > 1)  # for one robot column generation hardly needs it
         ascent = DualAscent(self.generation, self.memory, self.seed, self.threads, WHOLE if many else BRIEF)
         if many:  # a bound first; what searches beside the proof has time enough
             ascent.slots()
