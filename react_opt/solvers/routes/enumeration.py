@@ -100,27 +100,27 @@ def enumerate_routes(
     if ends is None:
         return None
     data, (ahead, back), (fuel, spent), (bound, past) = problem.classes[group], ends.prices, ends.fuel, ends.bound
-    middle = (data.start_step + problem.horizon) // 2
     idle_end = np.ascontiguousarray(pricer.rests.last[group][::-1])
     never = np.full_like(idle_end, NEVER)
-    forward = (pricer.forward, ahead, fuel, pricer.rests.begin[group], False, idle_end, bound, ends.rests, middle)
-    backward = (
-        pricer.backward, back, spent, pricer.rests.last[group], True, never, past, ends.beginnings,
-        problem.horizon - middle - 1,
-    )  # fmt: skip
+    forward = (pricer.forward, ahead, fuel, pricer.rests.begin[group], False, idle_end, bound, ends.rests)
+    backward = (pricer.backward, back, spent, pricer.rests.last[group], True, never, past, ends.beginnings)
     limits = (ends.cutoff, max_labels, pricer.stop)
-    if threads > 1:
-        with ThreadPoolExecutor(2) as pool:
-            halves = [
-                found.result() for found in [pool.submit(grow_sets, *half, *limits) for half in (forward, backward)]
-            ]
-    else:
-        halves = [grow_sets(*forward, *limits)]
-        if halves[0][3]:
-            halves.append(grow_sets(*backward, *limits))
-    if not all(half[3] for half in halves):
+    span = problem.horizon - data.start_step
+    middle, found = data.start_step + span // 2, None
+    for attempt in range(2):
+        sides = ((*forward, middle, *limits), (*backward, problem.horizon - middle - 1, *limits))
+        with ThreadPoolExecutor(2 if threads > 1 else 1) as pool:
+            halves = [half.result() for half in [pool.submit(grow_sets, *side) for side in sides]]
+        whole = [half[3] for half in halves]
+        if all(whole):
+            found = [Half(labels, sets, paid) for labels, sets, paid, _ in halves]
+        if attempt > 0 or all(whole) or not any(whole) or pricer.stop[0]:
+            break
+        # where the rests are too many the beginnings go on to the end; otherwise they end earlier
+        middle = problem.horizon if whole[0] else data.start_step + span // 4
+    if found is None:
         return None
-    beginnings, rests = (Half(labels, sets, paid) for labels, sets, paid, _ in halves)
+    beginnings, rests = found
     seam = Seam(
         problem.out_start, problem.arc_to, problem.arc_steps, ahead.arc_cost, ahead.wait_cost, fuel.arc, fuel.wait,
         fuel.budget, ahead.cut_price, idle_end,

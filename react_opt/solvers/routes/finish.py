@@ -18,7 +18,7 @@ from react_opt.solvers.routes.pool import PoolPrices, PoolProgram
 from react_opt.solvers.routes.setcuts import SetCut
 
 EASIER = 0.85  # share of the last hopeless gap at which it is tried again
-LEAST, MOST = 200_000, 1_500_000  # labels of each direction, and routes; in between as many as labels priced so far
+LEAST, MOST = 400_000, 1_500_000  # labels of each direction, and routes; in between as many as labels priced so far
 FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choosing among them, at most about a second
 
 

@@ -48,6 +48,12 @@ def test_the_best_route_of_every_set_that_loses_little_is_enumerated(seed: int) 
             column = found.column(pricer, k, one)
             assert sorted(column.cells) == cells[known]
             assert column.value == pytest.approx(wanted[known])
+        for most in (3, 10, 30):  # the beginnings end earlier or later where one side has too many labels
+            again = enumerate_routes(
+                pricer, k, Duals(price, np.zeros(len(problem.classes)), none, none), floor, max_labels=most, threads=2
+            )
+            if again is not None:
+                assert dict(zip(again.sets[:, 0].tolist(), again.value.tolist(), strict=True)) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("seed", range(20))
