@@ -15,6 +15,8 @@ of :mod:`react_opt.limits.reach`, so they hold for every continuous path. The le
 to share them, found exactly by dynamic programming (Held and Karp 1962), is the bound. It holds for any choice of the
 N_i; which ones are taken is a search for a strong bound, and no part of the proof.
 
+**From rest**: all of these times begin with a start, at which robots gather speed (:func:`from_rest_s`).
+
 **Both joined** (:mod:`react_opt.limits.detours`). A robot that has entered some of the N_i by T has seen nothing by T
 but what is visible from places that it can have come by on top of that.
 """
@@ -29,7 +31,7 @@ from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
 from react_opt.limits.detours import Detours, seen_from_blocks
-from react_opt.limits.hidden import Hidden
+from react_opt.limits.hidden import Hidden, from_rest_s
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -186,7 +188,7 @@ def time_bound(hidden: Hidden, regions: Regions, share: float, robots: int) -> B
     joined, size = detours(hidden, regions).strongest(share, robots, kept)
     if joined > found:
         found, used = joined, size
-    return Bound(share, robots, found, simple, used)
+    return Bound(share, robots, from_rest_s(found, hidden.gather_s), from_rest_s(simple, hidden.gather_s), used)
 
 
 def _search(worth: Callable[[list[int]], FloatArray], count: int, kept: list[int]) -> list[int]:

@@ -27,20 +27,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
+from react_opt.limits.alone import alone_s
 from react_opt.limits.hidden import Hidden
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_COUNTED = 8
+MOST_COUNTED = 10
 MOST_SHARED = 4100
 """So many ways to share regions among robots are tried at most: that limits how many regions are counted, too."""
 
 ROUNDS = 4
-"""How often the search for a family begins anew."""
+ROUNDS_ALONE = 12
+"""How often the search for a family begins anew, for a team and for one robot."""
 
-_GUIDE = np.array((1.0, 0.3, 0.1, 0.03))
-"""The search for a family goes by the bound, and a little by those with a half, a quarter and nothing to spare."""
+_GUIDE = ((1.0, 0.5, 0.25, 0.0), (1.0, 0.3, 0.1, 0.03))
+_GUIDE_ALONE = ((1.0, 0.8, 0.6, 0.4, 0.2, 0.0), (1.0, 0.5, 0.3, 0.2, 0.1, 0.05))
+"""The search for a family goes by the bound, and a little by those with such parts of what may be left out to spare."""
 
 _NEVER_S = 1e4  # what a bound counts there that cannot be reached at all
 _TRIED = 10
@@ -77,6 +80,20 @@ class Detours:
 
     def bounds_s(self, family: list[int], robots: int, needed: list[int]) -> FloatArray:
         """Return the bounds that a family of regions gives on seeing so many pixels, s."""
+        return self.alone_s(family, needed) if robots == 1 else self.team_s(family, robots, needed)
+
+    def alone_s(self, family: list[int], needed: list[int]) -> FloatArray:
+        """Return the bounds for the first robot alone, s."""
+        between = np.ascontiguousarray(self.between_s[np.ix_(family, family)])
+        start, block = np.ascontiguousarray(self.start_s[0, family]), np.ascontiguousarray(self.block_s[family])
+        found: FloatArray = alone_s(
+            start, between, self.start_block_s[0], block, self.begin, self.lists, self._hidden_in(family),
+            self.hidden.group_weight, np.array(needed),
+        )  # fmt: skip
+        return found
+
+    def team_s(self, family: list[int], robots: int, needed: list[int]) -> FloatArray:
+        """Return the bounds for the first robots together, s."""
         times = np.empty((robots, 1 << len(family), len(self.begin) - 1))
         alone = np.empty(times.shape[:2])
         between = np.ascontiguousarray(self.between_s[np.ix_(family, family)])
@@ -85,22 +102,27 @@ class Detours:
             start = np.ascontiguousarray(self.start_s[r, family])
             alone[r], least = detour_s(self.start_block_s[r], start, between, block)
             times[r] = group_s(np.ascontiguousarray(least.T), self.begin, self.lists).T
-        hidden_in = np.zeros(times.shape[2], dtype=np.int64)
-        for m, n in enumerate(family):
-            hidden_in |= self.inside[n].astype(np.int64) << m
-        weight = self.hidden.group_weight
+        hidden_in, weight = self._hidden_in(family), self.hidden.group_weight
         return np.array([joined_s(alone, times, hidden_in, weight, pixels, np.inf) for pixels in needed])
+
+    def _hidden_in(self, family: list[int]) -> IntArray:
+        """Return ``(groups,)`` bits: the regions of a family from which alone a group is visible."""
+        bits = np.zeros(self.inside.shape[1], dtype=np.int64)
+        for m, n in enumerate(family):
+            bits |= self.inside[n].astype(np.int64) << m
+        return bits
 
     def strongest(self, share: float, robots: int, first: list[int]) -> tuple[float, int]:
         """Return a strong bound on seeing a share, s, and how many regions it counts.
 
-        The search begins with the first ones of a list of regions, as many as serve best. Then, :data:`ROUNDS` times,
-        some of the best family found are dropped at random (none at first), and the region that helps most is added,
-        again and again. Where all have been tried once, only those that did best are tried again.
+        The search begins with the first ones of a list of regions, as many as serve best. Then, round by round, some of
+        the best family found are dropped at random (none at first), and the region that helps most is added, again and
+        again. Where all have been tried once, only those that did best are tried again.
         """
         total = self.hidden.total
         slack = total - int(np.ceil(share * total - 1e-9))
-        needed = [total - slack, total - slack // 2, total - slack // 4, total]
+        spare, guide = _GUIDE_ALONE if robots == 1 else _GUIDE
+        needed = [total - int(part * slack) for part in spare]
         most = min(MOST_COUNTED, int(np.log(MOST_SHARED) / np.log(robots + 1)))
         known: dict[frozenset[int], tuple[float, float]] = {}
 
@@ -108,13 +130,13 @@ class Detours:
             key = frozenset(family)
             if key not in known:
                 bounds = self.bounds_s(sorted(family), robots, needed)
-                known[key] = float(np.where(np.isfinite(bounds), bounds, _NEVER_S) @ _GUIDE), float(bounds[0])
+                known[key] = float(np.where(np.isfinite(bounds), bounds, _NEVER_S) @ guide), float(bounds[0])
             return known[key]
 
         kept = max((first[:size] for size in range(min(most, len(first)) + 1)), key=worth)
         tried = list(range(len(self.inside)))
         rng = np.random.default_rng(0)
-        for n in range(ROUNDS):
+        for n in range(ROUNDS_ALONE if robots == 1 else ROUNDS):
             family = [region for region in kept if n == 0 or rng.random() > 0.4]
             while len(family) < most:
                 ranked = sorted(((worth([*family, m]), -m) for m in tried if m not in family), reverse=True)

@@ -3,14 +3,15 @@
 Everything here errs on the safe side, so that what follows from it holds for every plan: a robot may stand wherever its
 inscribed circle fits, drives as fast as the law of :mod:`react_opt.energy` allows at the best clearance in the tile
 (and no slower than it can have braked to on its way in, since the simulator looks ahead no further), never turns and
-never gathers speed; a tile is seen from a place when any point of it can be seen from any point of that place.
+gathers speed at its start alone (:func:`from_rest_s`); a tile is seen from a place when any point of it can be seen
+from any point of that place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,8 @@ class Hidden:
     """``(robots, places)`` least time from each robot's start, s."""
     tile_m: float
     """Side of a tile, m."""
+    gather_s: float
+    """What gathering speed at the start costs each robot at least, s (:func:`from_rest_s`)."""
 
     @property
     def total(self) -> int:
@@ -134,8 +137,9 @@ def survey(world: World, profiles: Sequence[RobotProfile], starts_m: FloatArray)
     seen_from = np.zeros((int(group[-1]) + 1 if len(group) else 0, -(-int(at.sum()) // 64)), dtype=np.uint64)
     earliest = np.full((len(starts), len(rows)), np.inf)
     reach = max(p.lidar_range_m for p in profiles) / (side * unit)
+    gather = _gather_s(step, world.map.world_to_pixel(starts_m), side, unit, profiles)
     _look(np.ascontiguousarray(opaque), places, rows, cols, group, reach, memory(), starts, seen_from, earliest)
-    return Hidden(step, places, weight[rows, cols], earliest, group, seen_from, starts, side * unit)
+    return Hidden(step, places, weight[rows, cols], earliest, group, seen_from, starts, side * unit, gather)
 
 
 def _tiles(pixels: NDArray[np.generic], side: int, of: object, beyond: int) -> NDArray[np.generic]:
@@ -164,6 +168,40 @@ def _steps(world: World, profiles: Sequence[RobotProfile], side: int) -> FloatAr
     squared = np.maximum(squared, ndimage.grey_dilation(squared, structure=-lost))
     slowest = min(profile.speed_min_m_s for profile in profiles)
     return np.where(fits, side * unit / np.sqrt(np.maximum(squared, slowest**2)), np.inf)
+
+
+def from_rest_s(time_s: float, gather_s: float) -> float:
+    """Return when a robot that starts from rest can have done what takes it a time at full speed, s, at the earliest.
+
+    Its speed ``u`` seconds after the start is at most ``accel * (u + TICK_S)``: the simulator's robots gather speed at
+    the beginning of a tick. With ``V`` the least of the greatest speeds allowed near the start, the time at full speed
+    (the integral of speed over greatest speed) that it does by ``t`` is at most that of ``min(1, accel * u / V)`` up to
+    ``t + TICK_S``: ``t + TICK_S - V / (2 accel)``, or ``accel * (t + TICK_S) ** 2 / (2 V)`` before ``V / accel``.
+
+    Parameters
+    ----------
+    time_s
+        A lower bound for robots that gather speed at once, s.
+    gather_s
+        ``V / (2 accel)``, s (:attr:`Hidden.gather_s`).
+    """
+    late = time_s + gather_s if time_s >= gather_s else 2 * sqrt(gather_s * time_s)
+    return max(time_s, late - TICK_S)
+
+
+def _gather_s(
+    step: FloatArray, starts_px: FloatArray, side: int, unit: float, profiles: Sequence[RobotProfile]
+) -> float:
+    """Return :attr:`Hidden.gather_s`: for the slowest greatest speed of any tile that lies within the way it takes."""
+    accel = max(profile.accel_m_s2 for profile in profiles)
+    fastest = max(profile.speed_max_m_s for profile in profiles)
+    near = ceil(fastest**2 / (2 * accel) / (side * unit)) + 1
+    slowest = fastest
+    for x, y in starts_px:
+        r, c = int(y) // side, int(x) // side
+        steps = step[max(0, r - near) : r + near + 1, max(0, c - near) : c + near + 1]
+        slowest = min(slowest, side * unit / float(steps[np.isfinite(steps)].max()))
+    return slowest / (2 * accel)
 
 
 @kernel

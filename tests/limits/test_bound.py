@@ -12,7 +12,8 @@ from react_opt.energy import RobotProfile
 from react_opt.geometry.occupancy import OccupancyMap
 from react_opt.geometry.raycast import ray_table, scan_px
 from react_opt.limits.bound import candidates, detours, reachability_s, time_bound
-from react_opt.limits.hidden import survey
+from react_opt.limits.hidden import from_rest_s, survey
+from react_opt.sim.loop import TICK_S
 from react_opt.sim.world import World
 
 # Letters of one metre, three pixels each; robots drive 1 m/s, turn and gather speed at once.
@@ -100,6 +101,32 @@ def test_with_detours_no_plan_is_faster_whatever_regions_are_counted(
         family = rng.permutation(len(regions.weight))[:size].tolist()
         assert joined.bounds_s(family, len(starts), [needed])[0] <= best
     assert joined.strongest(share, len(starts), [])[0] <= best
+
+
+@pytest.mark.parametrize("drawing", [COMB, CROSS], ids=["comb", "cross"])
+def test_one_robot_alone_has_the_bound_of_a_team_of_one(drawing: str) -> None:
+    """The fast method takes only the sets that leave little unseen, and no splits one by one: it finds the same."""
+    starts = [(9.5, 1.5) if drawing == COMB else (4.5, 3.5)]
+    hidden = survey(world_of(drawing, starts), [ROBOT], np.array(starts))
+    joined = detours(hidden, candidates(hidden))
+    needed = [int(np.ceil(share * hidden.total)) for share in (0.7, 0.9, 1.0)]
+    rng = np.random.default_rng(1)
+    for size in (0, 1, 2, 3, 4, 5):
+        family = rng.permutation(len(joined.inside))[:size].tolist()
+        np.testing.assert_allclose(joined.alone_s(family, needed), joined.team_s(family, 1, needed), atol=2e-3)
+
+
+@pytest.mark.parametrize("accel", [0.3, 1.0, 4.0])
+@pytest.mark.parametrize("distance", [0.01, 0.2, 1.0, 7.0])
+def test_from_rest_is_no_later_than_a_robot_that_gathers_speed_tick_by_tick(accel: float, distance: float) -> None:
+    """On ground that allows 0.8 m/s near the start; where it allows more, the way counts less and takes no less."""
+    time, done, speed = 0.0, 0.0, 0.0
+    while done < distance:
+        speed = min(0.8, speed + accel * TICK_S)
+        time, done = time + min(TICK_S, (distance - done) / speed), done + speed * TICK_S
+    bound = from_rest_s(distance / 0.8, 0.8 / (2 * accel))
+    assert distance / 0.8 <= bound <= time + 1e-9
+    assert bound >= time - TICK_S - 1e-9
 
 
 def test_one_region_that_must_be_entered_tells_of_all_that_lies_elsewhere() -> None:
