@@ -31,11 +31,9 @@ EDGE_M = 3.0
 MOST_POINTS = 3000
 MOST_VISITED = 550
 MOST_PLACES = 30_000
-MOST_RARE = 100
-"""Places that become points because they alone show something, at most."""
 SAMPLES = 6000
 """About so many of the coverable pixels are counted in the search; the simulator counts all. With few of them the last
-percent is overfitted: what the search saw of a sample the simulator then missed of the rest."""
+percent is overfitted: of what the sample leaves open the simulator then misses more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +111,14 @@ def look_out(world: World, profile: RobotProfile, starts_m: FloatArray) -> Outlo
     regions = np.unique(space.regions_at(starts_m))
     reachable = np.isin(space.regions, regions[regions > 0])
     area_m2 = reachable.sum() * space.resolution_m**2
-    lattice, places, samples = _places(world, space, profile, reachable, area_m2)
+    lattice, samples = _places(world, space, profile, reachable, area_m2)
     points = np.concatenate((_standing_points(space, profile, reachable, area_m2), _nooks(world, space, profile)))
-    rare = _rare(lattice[2], np.bitwise_or.reduce(_own(lattice, points), axis=0))
-    points = np.concatenate((points, places[rare], starts))
-    own = _own(lattice, points)
+    points = np.concatenate((points, starts))
+    own = np.zeros((len(points), lattice[2].shape[1]), dtype=np.uint64)
+    for n, (u, v) in enumerate(points):
+        place = place_at(lattice, u, v)
+        if place >= 0:
+            own[n] = lattice[2][place]
     one, two, seconds = edges(
         space.padded, terrain(space, profile), np.ascontiguousarray(points / space.resolution_m),
         EDGE_M / space.resolution_m,
@@ -135,30 +136,6 @@ def look_out(world: World, profile: RobotProfile, starts_m: FloatArray) -> Outlo
     return Outlook(space, ground, lattice, points, chosen, time, out, into, seen, before, tail, loss, samples)
 
 
-def _own(lattice: Lattice, points: FloatArray) -> Bits:
-    """Return what a scan from each point shows."""
-    own = np.zeros((len(points), lattice[2].shape[1]), dtype=np.uint64)
-    for n, (u, v) in enumerate(points):
-        place = place_at(lattice, u, v)
-        if place >= 0:
-            own[n] = lattice[2][place]
-    return own
-
-
-def _rare(sees: Bits, known: Bits) -> list[int]:
-    """Return places that show what no point does, those that show most first: the last percent is seen from few."""
-    found: list[int] = []
-    left = np.arange(len(sees))
-    while len(found) < MOST_RARE:
-        gain = np.bitwise_count(sees[left] & ~known).sum(axis=1)
-        left = left[gain > 0]  # what gains nothing now never will
-        if len(left) == 0:
-            break
-        found.append(int(left[np.argmax(gain[gain > 0])]))
-        known = known | sees[found[-1]]
-    return found
-
-
 def _coarser(side: float, area_m2: float, most: int) -> float:
     """Return a side of squares that is no smaller, and so large that no more than so many fill an area."""
     return float(max(side, np.sqrt(area_m2 / most)))
@@ -166,8 +143,8 @@ def _coarser(side: float, area_m2: float, most: int) -> float:
 
 def _places(
     world: World, space: FreeSpace, profile: RobotProfile, reachable: NDArray[np.bool_], area_m2: float
-) -> tuple[Lattice, FloatArray, int]:
-    """Return a free place in every square that has one and what a scan from there shows; where; how many samples."""
+) -> tuple[Lattice, int]:
+    """Return a free place in every square that has one, and what a scan from there shows."""
     side_m = _coarser(PLACE_M, area_m2, MOST_PLACES)
     rows, cols = np.nonzero(reachable)
     side = side_m / space.resolution_m
@@ -189,8 +166,7 @@ def _places(
     sees = np.zeros((len(where), -(-len(pick) // 64)), dtype=np.uint64)
     table, reach = ray_table(profile.lidar_rays), profile.lidar_range_m / world.map.resolution_m
     _scan_all(world.map.cells, np.ascontiguousarray(where / space.refine), table, reach, sampled, sees)
-    places = np.asarray(where * space.resolution_m, dtype=np.float64)
-    return (number.reshape(high, wide), side_m, sees), places, len(pick)
+    return (number.reshape(high, wide), side_m, sees), len(pick)
 
 
 def _standing_points(
