@@ -2,15 +2,22 @@
 
 Each line is an instance and a solver: status, objective, bound, gap and time beside the row's target. ``!`` marks what
 misses the target, ``worse`` a plan of the decomposition that a peer beats, ``slower`` a proof that a peer had earlier.
-A peer that ends without a proof counts with its limit.
+A peer that ends without a proof counts with its limit. At the end: how many times as long each peer took as the
+decomposition, and the fastest peer of each instance (geometric means). With ``--results`` every run is kept in a file,
+and what is there is not run again.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 from families import metric_complete, walled_grid
 
@@ -21,6 +28,8 @@ from react_opt.solvers.monolith import solve_monolith
 from react_opt.solvers.outcome import Request
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.timegraph import route_problem
+
+PEERS = ["highs", "cp-sat", "scip"]
 
 
 @dataclass(frozen=True)
@@ -104,6 +113,41 @@ def by_peer(name: str, row: Row, seed: int, threads: int, limit_s: float) -> Out
     return found if found.status == "optimal" else replace(found, spent_s=max(limit_s, spent_s))
 
 
+class Results:
+    """Outcomes by what was run, kept in a file of one JSON object per line if there is one."""
+
+    def __init__(self, file: str | None) -> None:
+        self.path = None if file is None else Path(file)
+        self.known: dict[str, Outcome] = {}
+        if self.path is not None and self.path.exists():
+            lines = self.path.read_text().splitlines()
+            for number, text in enumerate(lines, start=1):
+                try:
+                    kept = json.loads(text)
+                    self.known[_key(kept["run"])] = Outcome(**kept["outcome"])
+                except (ValueError, KeyError, TypeError):
+                    if number < len(lines):  # the last line may be half written
+                        raise SystemExit(f"{file}, line {number}: expected a run and its outcome") from None
+
+    def get(self, run: dict[str, Any], solve: Callable[[], Outcome]) -> Outcome:
+        """Return the outcome of a run, which is made and kept if it is not known."""
+        key = _key(run)
+        if key not in self.known:
+            self.known[key] = solve()
+            if self.path is not None:
+                text = self.path.read_text() if self.path.exists() else ""
+                whole = text[: text.rfind("\n") + 1]
+                added = json.dumps({"run": run, "outcome": asdict(self.known[key])}) + "\n"
+                fresh = self.path.with_name(self.path.name + ".part")
+                fresh.write_text(whole + added)
+                fresh.replace(self.path)
+        return self.known[key]
+
+
+def _key(run: dict[str, Any]) -> str:
+    return json.dumps(run, sort_keys=True)
+
+
 def seeds_of(words: list[str]) -> list[int]:
     """Return seeds written one by one or as ranges: ``0 5-7`` is 0, 5, 6, 7."""
     ends = [word.split("-") for word in words]
@@ -121,33 +165,55 @@ def line(row: Row, seed: int, solver: str, found: Outcome, remark: str) -> str:
 
 
 def main() -> None:
+    groups = list(dict.fromkeys(row.group for row in TABLE))
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--groups", nargs="*", default=["paper", "small", "medium", "binding"])
-    parser.add_argument("--seeds", nargs="*", default=["0"], help="numbers or ranges such as 0-4")
+    parser.add_argument(
+        "--groups", nargs="+", choices=groups, default=["paper", "small", "medium", "binding"], metavar="GROUP",
+        help=f"rows of the table: {', '.join(groups)} (default: paper small medium binding)",
+    )  # fmt: skip
+    parser.add_argument("--seeds", nargs="+", default=["0"], help="numbers or ranges such as 0-4")
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--peers", nargs="*", default=[], help="backends for the monolith: highs cp-sat scip")
+    parser.add_argument(
+        "--peers", nargs="+", choices=PEERS, default=[], metavar="PEER",
+        help=f"backends that solve the monolith: {', '.join(PEERS)}",
+    )  # fmt: skip
     parser.add_argument("--limit-s", type=float, help="limit of every solver instead of the row's target")
+    parser.add_argument("--results", metavar="FILE.jsonl", help="keep each run here, and skip those that are there")
     options = parser.parse_args()
-    for battery in (1.0, 0.5):  # compile, or load from the cache, what is compiled
-        decomposed(Row("warm", 3, 4, 2, 12, 60.0, battery), 0, options.threads, 60.0)
+    results, warm = Results(options.results), False
+
+    def own_outcome(row: Row, seed: int, limit_s: float) -> Outcome:
+        nonlocal warm
+        if not warm:  # compile, or load from the cache, what is compiled
+            for battery in (1.0, 0.5):
+                decomposed(Row("warm", 3, 4, 2, 12, 60.0, battery), 0, options.threads, 60.0)
+            warm = True
+        return decomposed(row, seed, options.threads, limit_s)
+
     print(
         "group   cells robots    T battery seed solver  status       objective        bound       gap   time_s limit_s"
     )
-    ratios: dict[str, list[float]] = {name: [] for name in options.peers}
+    ratios: dict[str, list[float]] = {name: [] for name in [*options.peers, "best peer"]}
     rows = [row for row in TABLE if row.group in options.groups]
     for row, seed in ((row, seed) for row in rows for seed in seeds_of(options.seeds)):
         limit_s = options.limit_s or row.limit_s
-        own = decomposed(row, seed, options.threads, limit_s)
+        run = {**asdict(row), "seed": seed, "threads": options.threads, "limit_s": limit_s}
+        own = results.get({**run, "solver": "routes"}, partial(own_outcome, row, seed, limit_s))
         met = own.gap is not None and (own.gap <= row.gap if row.gap else own.status == "optimal")
         met &= own.spent_s <= 1.1 * row.limit_s + 0.1
         print(line(row, seed, "routes", own, "" if met else "!"), flush=True)
+        spent_s = []
         for name in options.peers:
-            peer = by_peer(name, row, seed, options.threads, limit_s)
+            solve = partial(by_peer, name, row, seed, options.threads, limit_s)
+            peer = results.get({**run, "solver": name}, solve)
+            spent_s.append(peer.spent_s)
             ratios[name].append(peer.spent_s / own.spent_s)
             slack = 1e-6 * abs(own.objective or 0.0)
             worse = peer.objective is not None and peer.objective > (own.objective or 0.0) + slack
             slower = peer.status == "optimal" and (own.status != "optimal" or peer.spent_s < own.spent_s)
             print(line(row, seed, name, peer, " ".join(["worse"] * worse + ["slower"] * slower)), flush=True)
+        if spent_s:
+            ratios["best peer"].append(min(spent_s) / own.spent_s)
     for name, times in ratios.items():
         if times:
             mean = math.exp(sum(map(math.log, times)) / len(times))
