@@ -310,4 +310,15 @@ def _read(instance: OrosInstance, certificate: Mapping[str, Any], memory: list[l
         sense,
         slot,
         worth,
+        _potential(certificate, memory),
     )
+
+
+def _potential(leaf: Mapping[str, Any], memory: list[list[int]]) -> NDArray[np.float64]:
+    """Return the prices that only bound the rest of a route; only where everything is remembered are there any."""
+    given = np.maximum(0.0, np.array(leaf.get("potential", []), dtype=np.float64))
+    if len(given) and (len(given) != len(memory) or any(len(near) != len(memory) for near in memory)):
+        raise UsageError("the certificate bounds the rest of a route by prices without remembering all cells")
+    if not np.all(np.isfinite(given)):
+        raise UsageError("the certificate bounds the rest of a route by prices that are no finite numbers")
+    return given

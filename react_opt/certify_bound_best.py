@@ -66,7 +66,8 @@ def best_route(
     goal = None if robot.return_to is None else index[robot.return_to]
     charging = charging_of(instance, robot)
     gain = gains(instance, prices, robot, first, last_of, charges=charging is not None)
-    rests = rests_of(instance, robot, prices, moves, gain, goal, joule_price, charging)
+    dear = gain - prices.potential if len(prices.potential) else gain
+    rests = rests_of(instance, robot, prices, moves, dear, goal, joule_price, charging)
     later = np.zeros((last + 2, n))
     later[: last + 1] = np.maximum.accumulate(np.maximum(gain, 0.0)[::-1])[::-1]
     worth = Worth(
@@ -77,6 +78,7 @@ def best_route(
         np.array([rest for _, rest in rests]),
         np.array([rate for rate, _ in rests]),
         np.array(prices.cut_price, dtype=np.float64),
+        prices.potential,
     )
     ways, memory, battery = _ways(moves, prices), _memory(moves, prices), _battery(instance, robot, moves, charging)
     layers, fill = _nothing(last + 1, n), 0

@@ -57,7 +57,8 @@ class Worth(NamedTuple):
     """What things are worth, ``(T + 1, n)``: collecting (after prices), ``later`` the most from then on (T + 2 rows).
 
     ``stand`` and ``slot`` are the prices of standing and of charging, ``rest[k]`` the most that the rest of a route is
-    worth where each joule costs ``rate[k]`` besides; ``cut`` holds the prices of the cuts.
+    worth where each joule costs ``rate[k]`` besides; ``cut`` holds the prices of the cuts. ``potential``, ``(n,)`` or
+    empty, are prices at which ``rest`` holds besides, where all cells are remembered, each by its own bit.
     """
 
     gain: Floats
@@ -67,6 +68,7 @@ class Worth(NamedTuple):
     rest: Floats
     rate: Floats
     cut: Floats
+    potential: Floats
 
 
 class Battery(NamedTuple):
@@ -106,10 +108,14 @@ def _longer(array: Any, least: int) -> Any:
 
 
 @kernel
-def _hopeful(t: int, i: int, value: float, used_j: float, worth: Worth, battery: Battery, best: float) -> bool:
+def _hopeful(t: int, i: int, value: float, memory: int, used_j: float, worth: Worth, battery: Battery, best: float,
+             ) -> bool:  # fmt: skip
     """Return whether a partial route that has come to a cell may still end above ``best``."""
     if used_j > battery.budget:
         return False
+    for cell in range(len(worth.potential)):
+        if not (memory >> cell) & 1:
+            value += worth.potential[cell]
     least = best + MARGIN * max(1.0, abs(best))
     for k in range(len(worth.rate)):
         left_j = (battery.budget if worth.rate[k] >= 0.0 else battery.full) - used_j
@@ -177,15 +183,14 @@ def _fetch(t: int, i: int, a: int, count: int, new: Any, ways: Ways, memory_of: 
     for k in range(first, final):
         value[count] = layers.value[k] - battery.sigma * energy_j - worth.stand[t, i]
         used_j[count] = layers.used_j[k] + energy_j
-        if not charges and not _hopeful(t, i, value[count], used_j[count], worth, battery, best):
-            continue
         memory[count], cuts[count] = layers.memory[k], layers.cuts[k]
         if a >= 0:
             word = np.int64(0)
             for bit in range(ways.carry[a], ways.carry[a + 1]):
                 word |= ((layers.memory[k] >> ways.bit_from[bit]) & 1) << ways.bit_to[bit]
             memory[count], cuts[count] = word, layers.cuts[k] & memory_of.held[i]
-        count += 1
+        if charges or _hopeful(t, i, value[count], memory[count], used_j[count], worth, battery, best):
+            count += 1
     return count, new
 
 
@@ -227,7 +232,7 @@ def _charge(t: int, i: int, begin: int, end: int, new: Any, worth: Worth, batter
         credit = 0.0 if k >= end else max(0.0, min(battery.amount[i], used_j[k] - battery.full))
         left = value[k] + battery.sigma * credit - (price if credit > 0.0 else 0.0)
         used = used_j[k] - credit
-        if _hopeful(t, i, left, used, worth, battery, best):
+        if _hopeful(t, i, left, memory[k], used, worth, battery, best):
             value[fill], memory[fill], cuts[fill], used_j[fill] = left, memory[k], cuts[k], used
             fill += 1
     return fill, new

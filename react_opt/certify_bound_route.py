@@ -34,7 +34,11 @@ class States(NamedTuple):
 
 
 class Prices(NamedTuple):
-    """Prices of a certificate, in the words of the instance."""
+    """Prices of a certificate, in the words of the instance.
+
+    ``potential``, ``(n_cells,)`` or empty, are prices that bound the rest of a route alone, where all is remembered: it
+    is worth no more than it would be at these prices, and those of the cells that are left.
+    """
 
     cell: Floats
     memory: list[list[int]]
@@ -45,6 +49,7 @@ class Prices(NamedTuple):
     sense: dict[int, float]
     slot: dict[tuple[int, int], float]
     rows_worth: float
+    potential: Floats
 
 
 class Moves(NamedTuple):

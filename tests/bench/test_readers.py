@@ -7,12 +7,14 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from benchmarks.readers import FORMATS, documents
 from benchmarks.readers.__main__ import main as convert
 from benchmarks.readers.tsplib import DISTANCES
 from react_opt import check, load, solve
+from react_opt.certify_bound import recompute_bound
 from react_opt.errors import InputError, UsageError
 
 POINTS = [(0, 0), (10, 0), (10, 7), (3, 8), (-5, 2), (-2, -9)]
@@ -54,6 +56,44 @@ def test_a_tsplib_file_is_a_minimum_latency_problem(tmp_path: Path) -> None:
         least = min(least, total)
     plan = solved(instance)
     assert plan.objective.coverage == 5 * (instance.horizon_steps + 1) - least
+
+
+def test_burma14_is_proven_and_its_proof_recomputed(tmp_path: Path) -> None:
+    """The published least latency of these 14 cities is 16160 (their shortest round trip 3323), return not counted.
+
+    A dynamic programme over all sets of cities says the same here.
+    """
+    cities = [(16.47, 96.10), (16.47, 94.44), (20.09, 92.54), (22.39, 93.37), (25.23, 97.24), (22.00, 96.05),
+              (20.47, 97.02), (17.20, 96.29), (16.30, 97.38), (14.05, 98.12), (16.53, 97.38), (21.52, 95.59),
+              (19.41, 97.13), (20.09, 94.55)]  # fmt: skip
+    section = "NODE_COORD_SECTION\n" + "".join(f"{k} {x} {y}\n" for k, (x, y) in enumerate(cities, start=1))
+    text = f"NAME: burma14\nTYPE: TSP\nDIMENSION: 14\nEDGE_WEIGHT_TYPE: GEO\n{section}EOF\n"
+    (instance,) = documents("tsplib", written(tmp_path, "burma14.tsp", text))
+    steps = np.array([[DISTANCES["GEO"](*a, *b) for b in cities] for a in cities])
+    assert least_latency(steps) == 16160
+    plan = solve(instance, method="routes", threads=1, time_limit_s=600)
+    assert plan.claim.status == "optimal"
+    assert 13 * (instance.horizon_steps + 1) - plan.objective.coverage == 16160
+    found = check(instance, plan, bound=True)
+    assert found.ok
+    assert found.bound == pytest.approx(plan.claim.bound)
+    forged = plan.claim.certificate
+    forged["classes"][0]["best"] -= 50.0
+    assert recompute_bound(instance, forged) >= plan.claim.objective - 1e-6
+
+
+def least_latency(steps: Any) -> int:
+    """Least sum of arrival times from the first city: each leg counts for all that are still to be visited."""
+    n = len(steps) - 1
+    best = np.full((1 << n, n), 1 << 40)
+    for j in range(n):
+        best[1 << j, j] = n * steps[0, j + 1]
+    for visited in range(1, 1 << n):
+        inside = [j for j in range(n) if visited >> j & 1]
+        for j in set(range(n)) - set(inside):
+            leg = steps[[i + 1 for i in inside], j + 1] * (n - len(inside))
+            best[visited | 1 << j, j] = min(best[visited | 1 << j, j], (best[visited, inside] + leg).min())
+    return int(best[-1].min())
 
 
 @pytest.mark.parametrize("form", ["FULL_MATRIX", "UPPER_ROW", "LOWER_DIAG_ROW", "UPPER_DIAG_ROW", "LOWER_ROW"])

@@ -10,6 +10,7 @@ import numpy as np
 
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.highs_model import fresh_scheduler
+from react_opt.solvers.routes.alone import fits, proven_alone
 from react_opt.solvers.routes.background import beside
 from react_opt.solvers.routes.budget import Budget, OnProgress, Standing, stopping
 from react_opt.solvers.routes.certificate import certificate, tree_certificate
@@ -108,6 +109,10 @@ class _Proof:
     def run(self) -> None:
         """Go on until the plan is proven or a limit is reached."""
         budget = self.standing.budget
+        if fits(self.problem):
+            self.proof = proven_alone(self.problem, self.standing) or {}
+            if self.standing.done():
+                return
         many = self.problem.n_cells >= MANY_CELLS and self.problem.reward.size >= MANY_PLACES
         some = self.problem.n_cells >= SOME_CELLS and self.problem.reward.size >= SOME_PLACES
         some = many or (some and self.problem.n_robots > 1)  # for one robot column generation hardly needs it
