@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +15,11 @@ from react_opt.solvers.routes.columns import Duals, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
 from react_opt.solvers.routes.enumeration import Enumerated, enumerate_routes
 from react_opt.solvers.routes.generation import Generation, Multipliers
-from react_opt.solvers.routes.pool import PoolPrices, PoolProgram
-from react_opt.solvers.routes.setcuts import SetCut
+from react_opt.solvers.routes.pool import CUTS_AT_ONCE, TINY, PoolPrices, PoolProgram
+from react_opt.solvers.routes.setcuts import SetCut, separate_sets
 
 EASIER = 0.85  # share of the last hopeless gap at which it is tried again
-LEAST, MOST = 400_000, 1_500_000  # labels of each direction, and routes; in between as many as labels priced so far
+LEAST, MOST = 400_000, 3_000_000  # labels of each direction, and routes; in between as many as labels priced so far
 FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choosing among them, at most about a second
 
 
@@ -116,7 +117,12 @@ class Finish:
             return Finished(worth), True
         if not np.array_equal(np.unique(pool.group), np.arange(len(counts))):
             return Finished(standing.objective or 0.0), True
-        program = PoolProgram(pool, _set_prices(duals, self.generation.master.cuts), counts.tolist(), must, standing)
+        first = _set_prices(duals, self.generation.master.cuts)
+        more_cuts = self._violated(set(first.cuts))
+        first = replace(
+            first, cuts=(*first.cuts, *more_cuts), price=np.concatenate((first.price, np.zeros(len(more_cuts))))
+        )
+        program = PoolProgram(pool, first, counts.tolist(), must, standing)
         while True:
             more = program.tighten()
             prices, floor = program.prices, standing.objective
@@ -130,6 +136,17 @@ class Finish:
                 return Finished(worth, tuple(program.stages)), True
             if not more:
                 return Finished(prices.bound, tuple(program.stages)), False
+
+    def _violated(self, known: set[SetCut]) -> list[SetCut]:
+        """Return cuts over sets that the last point of column generation violates: the first of the programme."""
+        point, columns = self.generation.point, self.generation.master.columns
+        if point is None or len(point.use) != len(columns):
+            return []
+        used = np.flatnonzero(point.use > TINY)
+        inside = np.zeros((len(used), self.generation.master.n_cells), dtype=np.uint8)
+        for row, k in enumerate(used.tolist()):
+            inside[row, list(columns[k].cells)] = 1
+        return separate_sets(inside, point.use[used], known, CUTS_AT_ONCE)
 
     def _best_of(
         self, pool: Pool, price: FloatArray, gap: float, most_work: int, found: list[Enumerated]

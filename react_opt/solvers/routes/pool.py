@@ -23,7 +23,7 @@ from react_opt.solvers.routes.region import everything
 from react_opt.solvers.routes.setcuts import Bits, SetCut, separate_sets
 from react_opt.solvers.routes.setprices import cost_of_sets
 
-FIRST_COLUMNS, COLUMNS = 400, 60
+FIRST_COLUMNS, COLUMNS = 400, 120
 ACTIVE = 20_000  # routes that are priced each time; all others only when these do not help any more
 SMOOTHING = 0.6
 EARLY = 0.03  # part of what the programme lies above the incumbent

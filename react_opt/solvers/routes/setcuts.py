@@ -58,9 +58,9 @@ class SetCut:
         return float(sum(self.times) // self.over)
 
     def coefficient(self, column: Column) -> float:
-        """Return the cut's coefficient in a column."""
-        total = sum(t * column.cells.count(cell) for cell, t in zip(self.cells, self.times, strict=True))
-        return float(total // self.over)
+        """Return the cut's coefficient in a column that collects no cell twice."""
+        held = column.cells
+        return float(sum([t for cell, t in zip(self.cells, self.times, strict=True) if cell in held]) // self.over)
 
     def coefficients(self, inside: Bits) -> IntArray:
         """Return its coefficient for each row of ``(m, n_cells)`` 0 or 1: the cells that a route collects."""
