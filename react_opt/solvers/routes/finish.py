@@ -122,7 +122,7 @@ class Finish:
         first = replace(
             first, cuts=(*first.cuts, *more_cuts), price=np.concatenate((first.price, np.zeros(len(more_cuts))))
         )
-        program = PoolProgram(pool, first, counts.tolist(), must, standing)
+        program = PoolProgram(pool, first, counts.tolist(), must, standing, self.threads)
         while True:
             more = program.tighten()
             prices, floor = program.prices, standing.objective

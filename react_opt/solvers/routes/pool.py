@@ -68,6 +68,8 @@ class PoolProgram:
         ``(n_cells,)`` cells that are collected in any case.
     standing
         The best plan so far and the limits.
+    threads
+        Threads for HiGHS, as many as in the master of the column generation: its scheduler serves one number only.
     """
 
     def __init__(
@@ -77,11 +79,12 @@ class PoolProgram:
         counts: Sequence[int],
         must: NDArray[np.bool_],
         standing: Standing,
+        threads: int = 1,
     ) -> None:
         n = len(first.cell)
         self.pool, self.must, self._standing = pool, must, standing
         self._counts = np.array(counts, dtype=np.int64)
-        self._master = Master(n, counts, 2.0 * float(np.abs(pool.value).max()) * (1 + sum(counts)) + 1.0)
+        self._master = Master(n, counts, 2.0 * float(np.abs(pool.value).max()) * (1 + sum(counts)) + 1.0, threads)
         self._master.restrict(replace(everything(len(counts), n, 0), must=must))
         self._route: dict[Column, int] = {}  # of each column of the master
         self._add(np.arange(min(FIRST_COLUMNS, len(pool.value))))

@@ -12,11 +12,13 @@ from test_choice import _by_trying, _case
 from test_tree import grid_problem
 
 from react_opt.models.replay import value
+from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes import engine, finish
 from react_opt.solvers.routes.budget import Budget, Standing
-from react_opt.solvers.routes.columns import Duals
+from react_opt.solvers.routes.columns import Column, Duals
 from react_opt.solvers.routes.engine import solve_routes
 from react_opt.solvers.routes.enumeration import enumerate_routes
+from react_opt.solvers.routes.master import Master
 from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pool import PoolPrices, PoolProgram
 from react_opt.solvers.routes.pricing import RoutePricer
@@ -105,6 +107,23 @@ def test_the_programme_over_routes_bounds_the_best_choice_and_keeps_its_routes(s
         rows = np.unpackbits(program.pool.sets.view(np.uint8), axis=1, bitorder="little")[:, : len(price)]
         assert _by_trying(program.pool, rows.astype(bool), counts) == pytest.approx(wanted)
         assert program.loss().min() >= -1e-9
+
+
+def test_the_programme_over_routes_runs_beside_a_master_with_threads() -> None:
+    """HiGHS serves one number of threads: a programme with another one than the master's would find no point."""
+    pool, _, counts, price, _ = next(_case(seed) for seed in range(60) if _has_plan(seed))
+    fresh_scheduler()
+    master = Master(1, [1], 10.0, threads=2)
+    master.add([Column(0, 1.0, (0,), None, (0,))])
+    assert master.solve(None) is not None
+    standing = Standing(random_problem(0), Budget(None, None, None), None, None)
+    standing.objective = -1.0
+    first = PoolPrices(np.inf, price + 5.0, np.zeros(len(counts)), (), np.zeros(0))
+    program = PoolProgram(pool, first, counts.tolist(), np.zeros(len(price), np.bool_), standing, threads=2)
+    before = program.prices.bound
+    program.tighten()
+    fresh_scheduler()
+    assert program.prices.bound < before - 1.0
 
 
 def test_optima_by_the_programme_over_routes(monkeypatch: pytest.MonkeyPatch) -> None:
