@@ -260,7 +260,7 @@ def main() -> int:
         ends: Counter[str] = Counter()
         for seed in range(asked.first, asked.first + asked.count):
             if time.monotonic() - begun > asked.limit_s:
-                print(f"stopped after {asked.limit_s:g} s at seed {seed} of {option}", flush=True)
+                print(f"stopped after {asked.limit_s:g} s at seed {seed} of {option}: {_counts(ends)}", flush=True)
                 return int(wrong > 0)
             instance = drawn(option, seed)
             end, faults = compared(instance, by_brute_force=seed % 2 == 0)
@@ -270,9 +270,12 @@ def main() -> int:
             wrong += len(faults)
             for fault in faults:
                 print(f"  {option} {seed}: {fault}", flush=True)
-        counts = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
-        print(f"{option:16} {asked.count:5d} instances: {counts}", flush=True)
+        print(f"{option:16} {asked.count:5d} instances: {_counts(ends)}", flush=True)
     return int(wrong > 0)
+
+
+def _counts(ends: Counter[str]) -> str:
+    return ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
 
 
 def _coupled(instance: OrosInstance) -> bool:

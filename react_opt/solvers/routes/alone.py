@@ -47,12 +47,13 @@ def proven_alone(problem: RouteProblem, standing: Standing) -> dict[str, Any] | 
         standing.offer([found.route])
     if not found.exact or standing.objective is None:
         return None
-    standing.lower_bound_to(found.value + 1e-10 * abs(found.value))
+    value = max(found.value, standing.objective)  # they may differ by rounding
+    standing.lower_bound_to(value + 1e-10 * abs(value))
     return {
         "kind": "lagrangian",
-        "bound": found.value,
+        "bound": value,
         "cell_price": [0.0] * problem.n_cells,
-        "classes": [{"robots": list(problem.classes[0].robots), "best": found.value}],
+        "classes": [{"robots": list(problem.classes[0].robots), "best": value}],
         "memory": "all",
         "cuts": [],
         "rows": [],
