@@ -71,12 +71,12 @@ class Driver:
             and way.order.sensing == sensing
             and hypot(way.goal_m[0] - goal_m[0], way.goal_m[1] - goal_m[1]) <= MOVED_M
             and robot.state in ("driving", "yielding")
-            and survey.is_free(_ahead(robot, way.order.path_m))
+            and survey.is_free(ahead(robot, way.order.path_m))
         ):
             return []
         path = belief.path(robot, goal_m)
         bold = belief.path(robot, goal_m, optimistic=True)
-        if len(path) == 0 or (len(bold) > 0 and _length_m(path) > DETOUR * _length_m(bold) + MOVED_M):
+        if len(path) == 0 or (len(bold) > 0 and length_m(path) > DETOUR * length_m(bold) + MOVED_M):
             path = bold
         if len(path) == 0:
             self._ways.pop(robot.id, None)
@@ -91,11 +91,12 @@ class Driver:
         return [stand(robot)] if way is not None or robot.target is not None else []
 
 
-def _length_m(path: tuple[Point, ...]) -> float:
+def length_m(path: tuple[Point, ...]) -> float:
+    """Return the length of a way, m."""
     return float(np.hypot(*np.diff(np.array(path), axis=0).T).sum())
 
 
-def _ahead(robot: RobotView, path: tuple[Point, ...]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def ahead(robot: RobotView, path: tuple[Point, ...]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """Return what is left of a path: from its way point nearest to the robot's segment on."""
     points = np.array(path, dtype=np.float64)
     at = np.array((robot.x_m, robot.y_m))

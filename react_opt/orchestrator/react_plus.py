@@ -1,12 +1,18 @@
 """``react_plus``, this engine's own strategy: the whole fleet's tours through all that is unexplored, always anew.
 
-It differs from REACT (:mod:`react_opt.orchestrator.react`) in what is decided together. There is no area to finish
-before the next one: pieces of the frontier and whole unexplored areas are targets alike, each with the free area that
-it is expected to reveal (:mod:`react_opt.orchestrator.regions`) and the nearest place from which enough of it can be
-seen. The tours of all robots through all targets are planned together, so that coverage grows early and the end comes
-soon (:mod:`react_opt.orchestrator.tours`): a small region is taken along where coming back for it would cost more, an
-area that has been seen in passing is no target any more. The plan is made anew whenever a target has been seen, a
-robot stands, and every few seconds; each robot drives to its first target only.
+It differs from REACT (:mod:`react_opt.orchestrator.react`) in what is decided together: there is no area to finish
+before the next one.
+
+* Pieces of the frontier and whole unexplored areas are targets alike, each with the free area that it is expected to
+  reveal (:mod:`react_opt.orchestrator.regions`) and the nearest place from which enough of it can be seen. A region
+  stays the same one as long as its hidden ground does, wherever its frontier moves.
+* The tours of all robots through all targets are planned together (:mod:`react_opt.orchestrator.tours`), so that
+  coverage grows early and the end comes soon: a small region is taken along where coming back for it would cost more,
+  an area that has been seen in passing is no target any more.
+* Robots are led through the next few places of their tours on ways that are quick to drive
+  (:mod:`react_opt.orchestrator.guide`, :mod:`react_opt.orchestrator.smooth`).
+
+The plan is made anew whenever a target has been seen, a robot stands, and every few seconds.
 """
 
 from __future__ import annotations
@@ -15,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
-from react_opt.orchestrator.orders import Driver, able, distance_m
+from react_opt.orchestrator.guide import Guide
+from react_opt.orchestrator.orders import able
 from react_opt.orchestrator.regions import Region, Regions, seen_from
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
 from react_opt.orchestrator.survey import COARSE, Block, Survey
@@ -44,7 +51,9 @@ SAME_M = 2.5
 """A region whose frontier moved less is the same one."""
 GONE = 0.25
 """A region of which no more than this share is still hidden has been seen."""
-SEEN_M = 0.6
+SEEN_M, PASSED_M = 0.6, 0.25
+STOPS = 3
+"""An order leads through so many regions at most."""
 GIVE_UP_M = 1.0
 STUCK_S = 30.0
 
@@ -54,10 +63,12 @@ class ReactPlus:
 
     def __init__(self, options: StrategyOptions) -> None:
         self.options = options
-        self.driver = Driver()
+        self.guide = Guide()
         self.survey: Survey | None = None
         self.regions: Regions | None = None
         self.goals: dict[str, Region] = {}
+        self.then: dict[str, list[Region]] = {}
+        self.was_at: dict[str, tuple[float, float]] = {}
         self.names: dict[str, str] = {}
         self.tours: list[list[tuple[float, float]]] = []
         self.given_up: list[tuple[float, float, float]] = []
@@ -80,6 +91,7 @@ class ReactPlus:
         due = belief.t_s >= self.planned_s + REPLAN_S or len(self.goals) < len(robots)
         for robot in robots:
             due |= self._settle(belief, robot, notes)
+        self.was_at = {robot.id: (robot.x_m, robot.y_m) for robot in robots}
         orders: list[Order] = []
         for _ in range(TRIES):  # a goal without a way is given up, and the others are planned without it
             if due:
@@ -99,8 +111,10 @@ class ReactPlus:
         if goal is None:
             return False
         name = self.names[robot.id]
-        if robot.state in ("idle", "stuck"):
-            near = distance_m(robot, goal.view_m) <= SEEN_M
+        still = robot.state in ("idle", "stuck")
+        passed_m = _passed_m(self.was_at.get(robot.id, (robot.x_m, robot.y_m)), robot, goal.view_m)
+        near = passed_m <= (SEEN_M if still else PASSED_M)
+        if still or near:
             if near or robot.state == "stuck":
                 if near:
                     self.looked.append(goal.view_m)
@@ -153,6 +167,7 @@ class ReactPlus:
         tours = _split(order)
         self.tours = [[found[k].at_m for k in tour] for tour in tours]
         for robot, tour in zip(robots, tours, strict=True):
+            self.then[robot.id] = [found[k] for k in tour[1:STOPS]]
             self._take(robot, found[tour[0]] if tour else None, notes)
         self.goals = {name: goal for name, goal in self.goals.items() if name in {robot.id for robot in robots}}
 
@@ -180,25 +195,30 @@ class ReactPlus:
         """Return s between the places of regions, from fields that are at most a few seconds old."""
         assert self.survey is not None
         rows = []
-        shape = self.survey.hidden.shape
         for region in found:
-            made_s, field = self.fields.get(region.view, (-np.inf, np.zeros((0, 0))))
-            if now_s > made_s + FIELD_S or field.shape != shape:
-                field = self.survey.times_from(*self.survey.point_of(region.view), optimistic=True)
-                self.fields[region.view] = (now_s, field)
+            field = self._field(now_s, region.view)
             rows.append([field[other.view] for other in found])
         self.fields = {block: row for block, row in self.fields.items() if now_s <= row[0] + FIELD_S}
         between = np.array(rows) + SERVICE_S
         between[~np.isfinite(between)] = FAR_S
         return between
 
+    def _field(self, now_s: float, block: Block) -> FloatArray:
+        """Return drive times from a block, a few seconds old perhaps."""
+        assert self.survey is not None
+        made_s, field = self.fields.get(block, (-np.inf, np.zeros((0, 0))))
+        if now_s > made_s + FIELD_S or field.shape != self.survey.hidden.shape:
+            field = self.survey.times_from(*self.survey.point_of(block), optimistic=True)
+            self.fields[block] = (now_s, field)
+        return field
+
     def _same(self, goal: Region | None, found: list[Region]) -> int:
         """Return the index of the region that a goal has become, -1 where it is gone."""
         if goal is None:
             return -1
-        gaps = [np.hypot(region.at_m[0] - goal.at_m[0], region.at_m[1] - goal.at_m[1]) for region in found]
-        best = int(np.argmin(gaps))
-        return best if gaps[best] <= SAME_M else -1
+        parts = [k for k, region in enumerate(found) if region.is_part_of(goal, SAME_M)]
+        at = goal.at_m
+        return min(parts, key=lambda k: float(np.hypot(found[k].at_m[0] - at[0], found[k].at_m[1] - at[1])), default=-1)
 
     def _begin(self, found: list[Region], robots: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the last tours in terms of the regions found now, and the regions that are in none of them."""
@@ -225,7 +245,7 @@ class ReactPlus:
             return
         before = self.goals.get(robot.id)
         self.goals[robot.id] = region
-        if before is not None and np.hypot(*np.subtract(before.at_m, region.at_m)) <= SAME_M:
+        if before is not None and region.is_part_of(before, SAME_M):
             return
         self.serial += 1
         self.names[robot.id] = f"region {self.serial}"
@@ -241,17 +261,45 @@ class ReactPlus:
             )
         )
 
+    def _stops(
+        self, robot: RobotView, goal: Region, area_of: NDArray[np.int64], explored: NDArray[np.bool_]
+    ) -> list[Block]:
+        """Return the places that a robot's order leads through.
+
+        Sensors may be off in explored areas but for the one where a way ends: it ends where the robot is to look.
+        """
+        stops = [goal.view]
+        for region in self.then.get(robot.id, []):
+            here, there = int(area_of[stops[-1]]), int(area_of[region.view])
+            if explored[here] and there != here:
+                break
+            stops.append(region.view)
+        return stops
+
     def _orders(self, belief: Belief, robot: RobotView) -> list[Order] | None:
         """Return the orders of a robot, None where there is no way to its goal, which is given up."""
         assert self.survey is not None
         goal = self.goals.get(robot.id)
         if goal is None:
-            return self.driver.stop(robot)
-        orders = self.driver.go(belief, self.survey, robot, goal.view_m, self.names[robot.id])
+            return self.guide.stop(robot)
+        assert self.regions is not None
+        area_of = self.regions.areas_of_blocks(self.survey, belief.areas)
+        explored = np.array([area.known_share >= self.options.delta for area in belief.areas])
+        stops = self._stops(robot, goal, area_of, explored)
+        orders = self.guide.go(belief, self.survey, robot, self.names[robot.id], stops)
         if orders is None:
             self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
             del self.goals[robot.id]
         return orders
+
+
+def _passed_m(before: tuple[float, float], robot: RobotView, point: tuple[float, float]) -> float:
+    """Return how near a robot has come to a point on the straight line from where it was, m."""
+    dx, dy = robot.x_m - before[0], robot.y_m - before[1]
+    square = dx * dx + dy * dy
+    share = 0.0 if square == 0 else ((point[0] - before[0]) * dx + (point[1] - before[1]) * dy) / square
+    share = min(1.0, max(0.0, share))
+    return float(np.hypot(before[0] + share * dx - point[0], before[1] + share * dy - point[1]))
 
 
 def _split(order: NDArray[np.int64]) -> list[list[int]]:

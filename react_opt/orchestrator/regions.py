@@ -24,6 +24,7 @@ from react_opt.orchestrator.survey_kernels import SOLID
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+NONE = np.zeros((0, 2), dtype=np.int64)
 MEAN_FREE_M = 3.0
 """Mean length of a look into hidden space, m."""
 DEEP_M = 5.0
@@ -66,6 +67,8 @@ class Region:
         Id of the area in which ``at_m`` lies.
     blocks
         ``(k, 2)`` its hidden coarse blocks that can be seen from the frontier, empty for a deep one.
+    ground
+        Numbers of all its hidden coarse blocks, row by row, empty for a deep one.
     """
 
     at_m: Point
@@ -76,6 +79,14 @@ class Region:
     frontier_m: float
     area: str
     blocks: IntArray
+    ground: IntArray
+
+    def is_part_of(self, before: Region, near_m: float) -> bool:
+        """Tell whether this is what is left of an earlier region: frontiers move as robots look behind them."""
+        if np.hypot(self.at_m[0] - before.at_m[0], self.at_m[1] - before.at_m[1]) <= near_m:
+            return True
+        left = len(np.intersect1d(self.ground, before.ground, assume_unique=True))
+        return bool(2 * left > len(self.ground))
 
 
 class Regions:
@@ -144,6 +155,7 @@ class Regions:
             low_row, low_col = max(0, row - LOOKED_BLOCKS), max(0, col - LOOKED_BLOCKS)
             fresh[low_row : row + LOOKED_BLOCKS + 1, low_col : col + LOOKED_BLOCKS + 1] = False
         members = _members(owner, depth, 3.0 / survey.coarse_m, len(clusters))
+        grounds = _members(owner, depth, np.inf, len(clusters))
         found = []
         for n, cluster in enumerate(clusters):
             value = min(float(near[n]) * block_m2, MOST_PER_M * cluster.length_m)
@@ -163,6 +175,7 @@ class Regions:
                     cluster.length_m,
                     areas[int(area_of[row, col])].id,
                     members[n],
+                    grounds[n][:, 0] * owner.shape[1] + grounds[n][:, 1],
                 )
             )
         for n, area in enumerate(areas) if deep else ():
@@ -174,7 +187,7 @@ class Regions:
             if block is not None:
                 at = survey.point_of(block)
                 size_m2 = float(behind[n, 0]) * survey.block_m**2
-                found.append(Region(at, at, block, value, size_m2, 0.0, area.id, np.zeros((0, 2), np.int64)))
+                found.append(Region(at, at, block, value, size_m2, 0.0, area.id, NONE, NONE[:, 0]))
         return found
 
     def _view(

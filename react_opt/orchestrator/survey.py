@@ -156,6 +156,10 @@ class Survey:
         way = self.to_blocks(way_m)
         return bool(way_is_free(self._clear_px, way, (self.radius_m - SLACK_M) / self.map.resolution_m))
 
+    def clearance_m(self) -> FloatArray:
+        """Return the distance from the centre of each block to what is known to be solid, m, up to a few radii."""
+        return np.asarray(self._clear_px * self.map.resolution_m)
+
     # --- seeing ---
 
     def clusters(self, shortest_m: float, widest_m: float = np.inf) -> list[Cluster]:
