@@ -33,17 +33,16 @@ from react_opt.limits.hidden import Hidden
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_COUNTED = 10
+MOST_COUNTED, MOST_ALONE = 8, 10
 MOST_SHARED = 4100
 """So many ways to share regions among robots are tried at most: that limits how many regions are counted, too."""
 
-ROUNDS = 4
-ROUNDS_ALONE = 12
-"""How often the search for a family begins anew, for a team and for one robot."""
+ROUNDS, ROUNDS_ALONE = 4, 16
+"""How often a search for a family begins anew, for a team and for one robot."""
 
 _GUIDE = ((1.0, 0.5, 0.25, 0.0), (1.0, 0.3, 0.1, 0.03))
-_GUIDE_ALONE = ((1.0, 0.8, 0.6, 0.4, 0.2, 0.0), (1.0, 0.5, 0.3, 0.2, 0.1, 0.05))
-"""The search for a family goes by the bound, and a little by those with such parts of what may be left out to spare."""
+_WIDE = ((1.0, 0.8, 0.6, 0.4, 0.2, 0.0), (1.0, 0.5, 0.3, 0.2, 0.1, 0.05))
+"""A search goes by the bound, and a little by those with such parts of what may be left out to spare, so weighted."""
 
 _NEVER_S = 1e4  # what a bound counts there that cannot be reached at all
 _TRIED = 10
@@ -117,26 +116,41 @@ class Detours:
 
         The search begins with the first ones of a list of regions, as many as serve best. Then, round by round, some of
         the best family found are dropped at random (none at first), and the region that helps most is added, again and
-        again. Where all have been tried once, only those that did best are tried again.
+        again. Where all have been tried once, only those that did best are tried again. For one robot, where that is
+        quick, a second search by another guide begins with what the first one found.
         """
+        most = min(MOST_COUNTED, int(np.log(MOST_SHARED) / np.log(robots + 1)))
+        families = [first[:size] for size in range(min(most, len(first)) + 1)]
+        kept, bound, size = self._search(share, robots, families, (most, ROUNDS, 3 * _TRIED), *_GUIDE)
+        if robots == 1:
+            _, other, larger = self._search(share, 1, [kept], (MOST_ALONE, ROUNDS_ALONE, 6 * _TRIED), *_WIDE)
+            if other > bound:
+                return other, larger
+        return bound, size
+
+    def _search(
+        self, share: float, robots: int, families: list[list[int]], effort: tuple[int, int, int],
+        spare: tuple[float, ...], guide: tuple[float, ...],
+    ) -> tuple[list[int], float, int]:  # fmt: skip
+        """Return a strong family by a guide; the best bound of any family tried and how many regions that one has."""
+        most, rounds, pool = effort  # regions counted, rounds, and regions tried in all but the first one
         total = self.hidden.total
         slack = total - int(np.ceil(share * total - 1e-9))
-        spare, guide = _GUIDE_ALONE if robots == 1 else _GUIDE
         needed = [total - int(part * slack) for part in spare]
-        most = min(MOST_COUNTED, int(np.log(MOST_SHARED) / np.log(robots + 1)))
         known: dict[frozenset[int], tuple[float, float]] = {}
 
         def worth(family: list[int]) -> tuple[float, float]:
             key = frozenset(family)
             if key not in known:
                 bounds = self.bounds_s(sorted(family), robots, needed)
-                known[key] = float(np.where(np.isfinite(bounds), bounds, _NEVER_S) @ guide), float(bounds[0])
+                value = np.where(np.isfinite(bounds), bounds, _NEVER_S) @ np.array(guide)
+                known[key] = float(value), float(bounds[0])
             return known[key]
 
-        kept = max((first[:size] for size in range(min(most, len(first)) + 1)), key=worth)
+        kept = max(families, key=worth)
         tried = list(range(len(self.inside)))
         rng = np.random.default_rng(0)
-        for n in range(ROUNDS_ALONE if robots == 1 else ROUNDS):
+        for n in range(rounds):
             family = [region for region in kept if n == 0 or rng.random() > 0.4]
             while len(family) < most:
                 ranked = sorted(((worth([*family, m]), -m) for m in tried if m not in family), reverse=True)
@@ -145,9 +159,9 @@ class Detours:
                 family.append(-ranked[0][1])
                 tried = [-m for _, m in ranked[: max(_TRIED, len(ranked) // 4)]]
             kept = max(kept, family, key=worth)
-            tried = [int(m) for m in rng.permutation(len(self.inside))[: 3 * _TRIED]]
+            tried = [int(m) for m in rng.permutation(len(self.inside))[:pool]]
         bound, size = max((bound, -len(key)) for key, (_, bound) in known.items())  # the search goes by more than that
-        return bound, -size
+        return kept, bound, -size
 
 
 @kernel
