@@ -37,7 +37,7 @@ MOST_COUNTED, MOST_ALONE = 8, 10
 MOST_SHARED = 4100
 """So many ways to share regions among robots are tried at most: that limits how many regions are counted, too."""
 
-ROUNDS, ROUNDS_ALONE = 4, 16
+ROUNDS, ROUNDS_ALONE = 4, 8
 """How often a search for a family begins anew, for a team and for one robot."""
 
 _GUIDE = ((1.0, 0.5, 0.25, 0.0), (1.0, 0.3, 0.1, 0.03))
