@@ -16,3 +16,10 @@ def test_decomposition_monolith_and_brute_force_agree(option: str, seed: int, mo
     monkeypatch.setattr(oros, "IMPROVE_S", 0.01)  # of primal search before the monolith, which needs no help here
     _, faults = compared(drawn(option, seed), by_brute_force=seed % 2 == 0, work_limit=200)
     assert faults == []
+
+
+def test_routes_that_differ_in_what_they_charge_are_columns_of_their_own() -> None:
+    """The plan in hand moves and senses as a better route does, but charges less: a master that takes the two for one
+    ends with a bound of 35.8, a step's waiting above the optimum."""
+    end, faults = compared(drawn("sigma", 447), by_brute_force=False)
+    assert (end, faults) == ("optimal", [])

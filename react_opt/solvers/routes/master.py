@@ -273,7 +273,8 @@ class Master:
 
 
 def _key(column: Column) -> tuple[int, bytes, bytes]:
-    """Return what tells a column from others: its group, and its path or, where it has none, its cells."""
-    if column.path is None:
+    """Return what tells a column from others: its group, and its path (what it charges, too) or else its cells."""
+    path = column.path
+    if path is None:
         return column.group, np.array(column.cells).tobytes(), b""
-    return column.group, column.path.cell.tobytes(), column.path.sense.tobytes()
+    return column.group, path.cell.tobytes(), path.sense.tobytes() + np.round(path.charge_j, 6).tobytes()
