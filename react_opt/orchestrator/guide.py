@@ -131,9 +131,9 @@ def _smooth(
 def _ground(belief: Belief, survey: Survey, robot: RobotView) -> Ground:
     """Return the clearances of blocks, robots that have died counted as solid."""
     clear = survey.clearance_m()
-    rows, cols = np.indices(clear.shape)
     for other in belief.robots:
         if other.state == "dead" and other.id != robot.id:
+            rows, cols = np.indices(clear.shape)
             x, y = survey.to_blocks((other.x_m, other.y_m))
             gap = np.hypot(cols + 0.5 - x, rows + 0.5 - y) * survey.block_m - other.profile.radius_m
             clear = np.minimum(clear, gap)

@@ -154,8 +154,8 @@ class Regions:
             row, col = survey.block_of(*point)
             low_row, low_col = max(0, row - LOOKED_BLOCKS), max(0, col - LOOKED_BLOCKS)
             fresh[low_row : row + LOOKED_BLOCKS + 1, low_col : col + LOOKED_BLOCKS + 1] = False
-        members = _members(owner, depth, 3.0 / survey.coarse_m, len(clusters))
-        grounds = _members(owner, depth, np.inf, len(clusters))
+        grounds = _grounds(owner, len(clusters))
+        members = [ground[depth[ground[:, 0], ground[:, 1]] <= 3.0 / survey.coarse_m] for ground in grounds]
         found = []
         for n, cluster in enumerate(clusters):
             value = min(float(near[n]) * block_m2, MOST_PER_M * cluster.length_m)
@@ -219,9 +219,9 @@ class Regions:
         return (int(best[0]), int(best[1])), float(seen[int(np.argmin(times))]) / len(targets)
 
 
-def _members(owner: IntArray, depth: FloatArray, deepest: float, count: int) -> list[IntArray]:
-    """Return for each frontier piece its hidden coarse blocks that are not deep."""
-    at = np.argwhere((owner >= 0) & (depth <= deepest))
+def _grounds(owner: IntArray, count: int) -> list[IntArray]:
+    """Return for each frontier piece its hidden coarse blocks."""
+    at = np.argwhere(owner >= 0)
     of = owner[at[:, 0], at[:, 1]]
     order = np.argsort(of, kind="stable")
     edges = np.searchsorted(of[order], np.arange(count + 1))
