@@ -2,17 +2,20 @@
 
 It simulates nothing and imports no simulator, belief, strategy or energy law: it states motion, battery and sensing
 again. Where noise is part of the mission, its cut-off (three deviations) widens the limits; between two instants it
-cannot know how much of a turn was made standing, so there the battery has a lower and an upper limit.
+cannot know how much of a turn was made standing, nor whether a robot that is too near to a wall to turn crept back and
+drove on again, so there the battery has a lower and an upper limit.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from functools import cached_property
 from math import hypot, inf
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from react_opt.certify_base import Certificate, Violation
 from react_opt.certify_scans import first_seen
@@ -24,6 +27,8 @@ CREEP_M_S = 0.05  # slower than this a turn counts as one on the spot
 CHARGE_M = 0.5  # a robot charges within this of a charger
 DIGITS = 1e-3  # frames are rounded to 1e-4
 CURVED = 1.01  # the way between two instants over the straight line, at most
+BACK_M_S = 0.1  # how fast a robot that cannot turn creeps away from a wall
+NEAR_M = 0.1  # it does within so much more than its radius of one
 OPTIONS = ("strategy", "seed", "always_on", "robots", "failures")  # what the command line may change
 
 
@@ -232,8 +237,21 @@ class _Replay:
         base = profile.idle_w * alive + profile.sensing_w * float(part[:-1, 3].sum()) * self.step_s
         metre = profile.motion_w / profile.speed_max_m_s
         low = base + metre * float(length.sum())
-        high = base + metre * float(length.sum()) * CURVED + turning
+        crept = BACK_M_S * self.step_s * self._near_walls(part[:-1], profile)  # half a step back, the same way forth
+        high = base + metre * (float(length.sum()) * CURVED + crept) + turning
         return self.power[0] * low - self._charged(n, part, end_s - start_s), self.power[1] * high
+
+    def _near_walls(self, poses: FloatArray, profile: Profile) -> int:
+        """Return how many of some poses are so near to a wall that a robot may be unable to turn there."""
+        rows, cols = self.clear_m.shape
+        at = np.clip((poses[:, 1::-1] / self.unit_m).astype(np.int64), 0, (rows - 1, cols - 1))
+        reach_m = _radius(profile) + NEAR_M + self.unit_m
+        return int(np.count_nonzero(self.clear_m[at[:, 0], at[:, 1]] <= reach_m))
+
+    @cached_property
+    def clear_m(self) -> FloatArray:
+        """Distances of pixels to the nearest that is not free, m."""
+        return np.asarray(distance_transform_edt(self.cells == 0), dtype=np.float64) * self.unit_m
 
     def _most(self, profile: Profile, time_s: float) -> float:
         watts = profile.idle_w + profile.motion_w * self.fast + profile.turn_w + profile.sensing_w

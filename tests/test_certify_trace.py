@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from react_opt.certify_trace import check_trace
+from react_opt.certify_trace import _Replay, check_trace
 from react_opt.instance import Mission, Noise
 from react_opt.sim.loop import Simulation
 from react_opt.trace import NEVER, Trace, pixel_data, track_data
-from tests.sim.missions import TWO_ROOMS, mission
+from tests.sim.missions import JACKAL, TWO_ROOMS, mission
 
 MISSION: Mission = mission([(1.5, 1.5), (1.5, 4.0)], noise=Noise(speed=0.05, waiting_s=0.3, power=0.02), horizon_s=30.0)
 
@@ -74,6 +74,23 @@ def test_sensing_that_costs_nothing_is_named(good: Trace) -> None:
             frame["robots"][0]["battery_j"] += saved
 
     assert "battery" in rules(with_frames(good, change))
+
+
+def test_creeping_back_between_two_instants_is_paid_for_beside_walls_alone() -> None:
+    exact = mission([(0.5, 1.5)], horizon_s=15.0)
+    trace = Simulation(exact, TWO_ROOMS).run()
+    replay = _Replay(trace)
+    most_j = [replay._spent(0, float(t), t + 1.0)[1] for t in range(14)]
+    replay.clear_m = np.full(TWO_ROOMS.cells.shape, np.inf)  # the same poses in a desert
+    open_j = [replay._spent(0, float(t), t + 1.0)[1] for t in range(14)]
+    blocked = np.argwhere(TWO_ROOMS.cells != 0)[:, ::-1] * 0.1 + 0.05
+    gap_m = np.array([np.hypot(*(blocked - pose[:2]).T).min() for pose in trace.tracks[0].array()])
+    step_j = 0.1 * 0.25 * JACKAL.motion_w / JACKAL.speed_max_m_s  # 0.1 m/s to and fro for half a step each
+    assert gap_m[0] < 0.5  # it starts beside a wall
+    assert step_j - 1e-9 <= most_j[0] - open_j[0] <= 4 * step_j + 1e-9
+    amid = [t for t in range(14) if (gap_m[4 * t : 4 * t + 4] > 0.8).all()]
+    assert amid
+    assert [most_j[t] for t in amid] == [open_j[t] for t in amid]
 
 
 def test_a_coverage_that_is_not_so_is_named(good: Trace) -> None:
