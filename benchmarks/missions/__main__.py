@@ -86,13 +86,12 @@ def settings_of(options: argparse.Namespace, most: int) -> list[Setting]:
     """Return the points of a campaign."""
     teams = [n for n in options.robots if n <= most]
     settings = [Setting(name, n) for name in options.strategies for n in teams]
-    paper = [name for name in options.strategies if name in ("oros", *RATED)]
-    if not options.quick:
-        settings += [Setting(name, n, rule) for name in paper for n in teams if n <= 3 for rule in RULES[1:]]
-        settings += [Setting(name, n, always_on=True) for name in paper for n in teams if n <= 3]
-        rated = [name for name in paper if name in RATED]
-        settings += [Setting(name, n, blocking=False) for name in rated for n in teams if n >= 3]
-        settings += [Setting(name, 1, horizon_s=360.0) for name in rated if 1 in teams]
+    paper = [name for name in options.strategies if name in options.variants and not options.quick]
+    settings += [Setting(name, n, rule) for name in paper for n in teams if n <= 3 for rule in RULES[1:]]
+    settings += [Setting(name, n, always_on=True) for name in paper for n in teams if n <= 3]
+    rated = [name for name in paper if name in RATED]
+    settings += [Setting(name, n, blocking=False) for name in rated for n in teams if n >= 3]
+    settings += [Setting(name, 1, horizon_s=360.0) for name in rated if 1 in teams]
     return settings
 
 
@@ -106,6 +105,13 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--robots", nargs="+", type=int, default=[1, 2, 3, 4], help="team sizes: the first robots")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--quick", action="store_true", help="main table alone: one rule, no always-on, no no-blocking")
+    parser.add_argument(
+        "--variants",
+        nargs="*",
+        choices=strategy_names(),
+        default=["oros", *RATED],
+        help="strategies also run with the other switching rules and always on (react and react_plus: T = 360 s too)",
+    )
     parser.add_argument("--no-limits", action="store_true", help="no bounds and no full-map plans")
     parser.add_argument("--steps", type=int, default=600_000, help="moves per search of a full-map plan")
     parser.add_argument("--restarts", type=int, default=4, help="searches per full-map plan")

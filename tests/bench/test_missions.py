@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from extras import need
 
-from benchmarks.missions.__main__ import main
+from benchmarks.missions.__main__ import FACTORY, _options, main, settings_of
 from benchmarks.missions.goals import goals
 from benchmarks.missions.paper import Campaign, all_tables
 from benchmarks.missions.runs import Setting
 from benchmarks.missions.tables import Table, mean, spread
+from react_opt.jsonio import load
 
 
 def result(robots: int, scale: float, coverage: float = 1.0) -> dict[str, Any]:
@@ -89,14 +90,20 @@ def test_columns_line_up() -> None:
 
 
 def test_settings_differ_in_their_keys_and_become_missions() -> None:
-    from benchmarks.missions.__main__ import FACTORY, _options, settings_of
-    from react_opt.jsonio import load
-
     settings = settings_of(_options([]), 4)
     keys = [setting.key(1) for setting in settings]
     assert len(set(keys)) == len(keys)
     mission = Setting("react", 3, blocking=False, horizon_s=360.0).mission(load(FACTORY, "mission"), 7)
     assert (len(mission.robots), mission.blocking, mission.horizon_s, mission.seed) == (3, False, 360.0, 7)
+
+
+def test_variants_are_run_of_the_strategies_named_alone() -> None:
+    """A team of three: two more switching rules, always on and, where it is rated, without blocking."""
+    chosen = ["--strategies", "oros", "react_plus", "nearest", "--robots", "3"]
+    all_of = settings_of(_options([*chosen, "--variants", "react_plus"]), 4)
+    assert [setting.strategy for setting in all_of] == ["oros", "react_plus", "nearest"] + ["react_plus"] * 4
+    assert len(settings_of(_options(chosen), 4)) == 3 + 3 + 4
+    assert len(settings_of(_options([*chosen, "--quick"]), 4)) == 3
 
 
 def test_a_campaign_runs_and_goes_on_where_it_was_stopped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
