@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from functools import cached_property
 from math import hypot, inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from react_opt.certify_base import Certificate, Violation
 from react_opt.certify_scans import first_seen
@@ -243,15 +241,14 @@ class _Replay:
 
     def _near_walls(self, poses: FloatArray, profile: Profile) -> int:
         """Return how many of some poses are so near to a wall that a robot may be unable to turn there."""
-        rows, cols = self.clear_m.shape
-        at = np.clip((poses[:, 1::-1] / self.unit_m).astype(np.int64), 0, (rows - 1, cols - 1))
-        reach_m = _radius(profile) + NEAR_M + self.unit_m
-        return int(np.count_nonzero(self.clear_m[at[:, 0], at[:, 1]] <= reach_m))
-
-    @cached_property
-    def clear_m(self) -> FloatArray:
-        """Distances of pixels to the nearest that is not free, m."""
-        return np.asarray(distance_transform_edt(self.cells == 0), dtype=np.float64) * self.unit_m
+        reach = (_radius(profile) + NEAR_M) / self.unit_m
+        count = 0
+        for u, v in poses[:, :2] / self.unit_m:
+            top, left = max(0, int(v - reach)), max(0, int(u - reach))
+            around = np.argwhere(self.cells[top : int(v + reach) + 1, left : int(u + reach) + 1] != 0)
+            off = np.abs(around + np.array([top + 0.5 - v, left + 0.5 - u])) - 0.5  # to the nearest edge of each pixel
+            count += bool(np.any(np.hypot(*np.maximum(off, 0.0).T) <= reach))
+        return count
 
     def _most(self, profile: Profile, time_s: float) -> float:
         watts = profile.idle_w + profile.motion_w * self.fast + profile.turn_w + profile.sensing_w

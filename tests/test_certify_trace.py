@@ -81,7 +81,7 @@ def test_creeping_back_between_two_instants_is_paid_for_beside_walls_alone() -> 
     trace = Simulation(exact, TWO_ROOMS).run()
     replay = _Replay(trace)
     most_j = [replay._spent(0, float(t), t + 1.0)[1] for t in range(14)]
-    replay.clear_m = np.full(TWO_ROOMS.cells.shape, np.inf)  # the same poses in a desert
+    replay.cells = np.zeros_like(TWO_ROOMS.cells)  # the same poses in a desert
     open_j = [replay._spent(0, float(t), t + 1.0)[1] for t in range(14)]
     blocked = np.argwhere(TWO_ROOMS.cells != 0)[:, ::-1] * 0.1 + 0.05
     gap_m = np.array([np.hypot(*(blocked - pose[:2]).T).min() for pose in trace.tracks[0].array()])
