@@ -28,9 +28,11 @@ from numpy.typing import NDArray
 from react_opt.certify_bound_best import best_route
 from react_opt.certify_bound_choice import best_of, repriced
 from react_opt.certify_bound_enumerate import worthwhile_routes
-from react_opt.certify_bound_route import Prices
+from react_opt.certify_bound_route import Prices, lowest_prices
 from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance, OrosRobot
+
+RULES = ("robots_per_cell", "sensing_robots_per_step", "charging_slots")
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def recompute_bound(
     """
     try:
         return _recomputed(instance, certificate, tell)
-    except (KeyError, TypeError, ValueError, IndexError) as fault:
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError) as fault:
         raise UsageError(f"the certificate cannot be read: {type(fault).__name__}: {fault}") from fault
 
 
@@ -98,6 +100,8 @@ def _recomputed(instance: OrosInstance, certificate: Mapping[str, Any], tell: Ca
         bound = _bound_of(instance, certificate, memory, whole, tell)
     else:
         bound = _bound_of_tree(instance, certificate["tree"], memory, whole, tell)
+    if not math.isfinite(bound):
+        raise UsageError("the certificate proves no number")
     return _explored_value(instance) + _rounded(instance, bound)
 
 
@@ -210,7 +214,7 @@ def _bound_of_choice(instance: OrosInstance, leaf: Mapping[str, Any], prices: Pr
     for stage in leaf.get("pool", []):
         if not all(len(routes.value) for routes in found):
             return floor
-        found, best, cell, total = repriced(found, counts, stage, part.must, floor)
+        found, best, cell, total = repriced(found, counts, stage, lowest_prices(instance, part.must), floor)
         losable = total - floor
         if losable <= 0.0:
             return floor
@@ -276,9 +280,11 @@ def _read(instance: OrosInstance, certificate: Mapping[str, Any], memory: list[l
     cell = np.array(certificate["cell_price"], dtype=np.float64)
     if len(cell) != n or not np.all(np.isfinite(cell)):
         raise UsageError(f"the certificate prices {len(cell)} cells, the instance has {n}; prices are finite numbers")
-    cell = np.where(part.must, cell, np.maximum(0.0, cell))
+    cell = np.maximum(cell, lowest_prices(instance, part.must))
     if len(certificate["cuts"]) > 64:
         raise UsageError("the certificate has more than 64 cuts")
+    if any(len({int(c) for c in cut["cells"]}) > 3 for cut in certificate["cuts"]):
+        raise UsageError("the certificate has a cut over more than three cells")
     stand: dict[tuple[int, int], float] = {}
     sense: dict[int, float] = {}
     slot: dict[tuple[int, int], float] = {}
@@ -286,6 +292,8 @@ def _read(instance: OrosInstance, certificate: Mapping[str, Any], memory: list[l
     worth = 0.0
     for row in certificate["rows"]:
         price = max(0.0, float(row["price"]))
+        if row["rule"] not in RULES:
+            raise UsageError("the certificate prices a rule that is none of " + ", ".join(RULES))
         charges = row["rule"] == "charging_slots"
         limit = slots.get(instance.cells[int(row["cell"])].id) if charges else getattr(instance.limits, row["rule"])
         if limit is None:

@@ -6,6 +6,7 @@ made the claim: the motion, the battery and the rewards are stated again, on pur
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -67,7 +68,8 @@ def best_route(
     charging = charging_of(instance, robot)
     gain = gains(instance, prices, robot, first, last_of, charges=charging is not None)
     dear = gain - prices.potential if len(prices.potential) else gain
-    rests = rests_of(instance, robot, prices, moves, dear, goal, joule_price, charging)
+    battery = _battery(instance, robot, moves, charging)
+    rests = rests_of(instance, robot, prices, moves, dear, goal, joule_price if battery.limited else 0.0, charging)
     later = np.zeros((last + 2, n))
     later[: last + 1] = np.maximum.accumulate(np.maximum(gain, 0.0)[::-1])[::-1]
     worth = Worth(
@@ -80,7 +82,7 @@ def best_route(
         np.array(prices.cut_price, dtype=np.float64),
         prices.potential,
     )
-    ways, memory, battery = _ways(moves, prices), _memory(moves, prices), _battery(instance, robot, moves, charging)
+    ways, memory = _ways(moves, prices), _memory(moves, prices)
     layers, fill = _nothing(last + 1, n), 0
     constant = instance.sigma * robot.battery_j
     best = claimed - constant
@@ -137,6 +139,10 @@ def _battery(instance: OrosInstance, robot: OrosRobot, moves: Moves, charging: C
     budget += 1e-9 * max(1.0, budget)
     none = np.zeros((0, 0))
     limited = charging is not None or can_run_dry(instance, robot, moves, budget)
+    if not limited:
+        # partial routes that collect a cell again may use more than any route; one dropped for that could have
+        # displaced one that uses less
+        budget = sys.float_info.max
     return Battery(
         instance.sigma,
         moves.idle_j,

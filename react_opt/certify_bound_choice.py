@@ -21,9 +21,11 @@ from react_opt.certify_bound_enumerate import Found
 from react_opt.certify_bound_route import MARGIN, Floats
 from react_opt.errors import UsageError
 
+MOST_TIMES = 10**9
+
 
 def repriced(
-    found: list[Found], counts: list[int], pool: Mapping[str, Any], must: NDArray[np.bool_], floor: float
+    found: list[Found], counts: list[int], pool: Mapping[str, Any], lowest: Floats, floor: float
 ) -> tuple[list[Found], list[float], Floats, float]:
     """Return the routes that count at other prices, the most that one of each class is worth then, and the bound.
 
@@ -37,20 +39,22 @@ def repriced(
         Routes of each class and how many robots there are.
     pool
         ``cell_price`` and ``cuts`` (cells, times, over, price).
-    must
-        ``(n_cells,)`` cells that are collected in any case; only their price may be negative.
+    lowest
+        ``(n_cells,)`` least price that counts of each cell.
     floor
         Value of interest.
     """
     cell = np.array(pool["cell_price"], dtype=np.float64)
-    if len(cell) != len(must) or not np.all(np.isfinite(cell)):
-        raise UsageError(f"the certificate prices {len(cell)} cells, the instance has {len(must)}")
-    cell = np.where(must, cell, np.maximum(0.0, cell))
+    if len(cell) != len(lowest) or not np.all(np.isfinite(cell)):
+        raise UsageError(f"the certificate prices {len(cell)} cells, the instance has {len(lowest)}")
+    cell = np.maximum(cell, lowest)
     total = float(cell.sum())
     inside = [np.unpackbits(routes.sets.view(np.uint8), axis=1, bitorder="little")[:, : len(cell)] for routes in found]
     worth = [routes.value - collected @ cell for routes, collected in zip(found, inside, strict=True)]
     for cut in pool["cuts"]:
         price, over = max(0.0, float(cut["price"])), int(cut["over"])
+        if max(over, sum(abs(int(t)) for t in cut["times"])) > MOST_TIMES:
+            raise UsageError("the certificate holds a cut with multipliers that are too large to be counted")
         cells, times = [int(c) for c in cut["cells"]], np.array([int(t) for t in cut["times"]], dtype=np.int64)
         if over < 1 or len(times) != len(cells) or len(set(cells)) != len(cells) or times.min(initial=0) < 0:
             raise UsageError("the certificate holds a cut whose cells and multipliers do not fit")

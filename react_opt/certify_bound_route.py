@@ -60,6 +60,16 @@ class Moves(NamedTuple):
     sense_j: float
 
 
+def lowest_prices(instance: OrosInstance, must: NDArray[np.bool_]) -> Floats:
+    """Return ``(n_cells,)`` the least price that counts of each cell: below 0 for those collected in any case alone.
+
+    Far below minus the value of any plan nothing would be left of values beside prices: `MARGIN` grows with them.
+    """
+    most = instance.horizon_steps * sum(cell.weight for cell in instance.cells)
+    most += instance.sigma * sum(robot.capacity_j for robot in instance.robots)
+    return np.where(must, -100.0 * (1.0 + most), 0.0)
+
+
 def moves_of(instance: OrosInstance, robot: OrosRobot) -> Moves:
     """Return the moves of a robot."""
     index = {cell.id: i for i, cell in enumerate(instance.cells)}

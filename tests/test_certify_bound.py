@@ -206,11 +206,11 @@ def test_prices_over_enumerated_routes_are_recomputed(monkeypatch: pytest.Monkey
 def test_cuts_over_routes_that_do_not_fit_are_refused() -> None:
     """A cut needs one whole multiplier that is not negative for each of its cells."""
     found = [Found(np.array([[1]], dtype=np.uint64), np.zeros(1), np.ones(1))]
-    must = np.zeros(2, dtype=bool)
+    lowest = np.zeros(2)
     for cut in ({"times": [1]}, {"times": [1, -1]}, {"cells": [0, 0]}, {"over": 0}):
         pool = {"cell_price": [0.0, 0.0], "cuts": [{"cells": [0, 1], "times": [1, 1], "over": 2, "price": 1.0, **cut}]}
         with pytest.raises(UsageError, match="do not fit"):
-            repriced(found, [1], pool, must, 0.0)
+            repriced(found, [1], pool, lowest, 0.0)
 
 
 def _lower(tree: list[dict]) -> None:
