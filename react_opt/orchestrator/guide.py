@@ -14,7 +14,7 @@ from math import hypot
 import numpy as np
 
 from react_opt.orchestrator.belief import Belief, RobotView
-from react_opt.orchestrator.orders import DETOUR, MOVED_M, ahead, length_m, stand
+from react_opt.orchestrator.orders import MOVED_M, ahead, length_m, stand, way_to
 from react_opt.orchestrator.smooth import Ground, law_of, smoothed
 from react_opt.orchestrator.strategy import Order, Point
 from react_opt.orchestrator.survey import Block, Survey
@@ -65,7 +65,7 @@ class Guide:
         on = way is not None and robot.state in ("driving", "yielding") and robot.target == way.order.target
         if way is not None and on and _same(way.stops_m, stops_m) and survey.is_free(ahead(robot, way.order.path_m)):
             return []
-        path = _shorter(belief, robot, stops_m[0])
+        path = way_to(belief, robot, stops_m[0])
         if len(path) == 0:
             self._ways.pop(robot.id, None)
             return None
@@ -101,14 +101,6 @@ def _near(one: Point, other: Point) -> bool:
 def _same(before: tuple[Point, ...], now: tuple[Point, ...]) -> bool:
     """Tell whether a way through places still leads through the first two that are wanted."""
     return all(n < len(before) and _near(before[n], stop) for n, stop in enumerate(now[:2]))
-
-
-def _shorter(belief: Belief, robot: RobotView, goal_m: Point) -> tuple[Point, ...]:
-    """Return the way over known-free space where that is not much longer, else through unknown space taken as free."""
-    path = belief.path(robot, goal_m)
-    bold = belief.path(robot, goal_m, optimistic=True)
-    longer = len(bold) > 0 and length_m(path) > DETOUR * length_m(bold) + MOVED_M if len(path) else True
-    return bold if longer else path
 
 
 def _smooth(

@@ -60,10 +60,7 @@ class Driver:
     def go(
         self, belief: Belief, survey: Survey, robot: RobotView, goal_m: Point, target: str, *, sensing: bool = True
     ) -> list[Order] | None:
-        """Return the order to drive to a point, nothing where the order in force does, None where there is no way.
-
-        Over known-free space where that is not much longer, else through unknown space taken as free.
-        """
+        """Return the order to drive to a point, nothing where the order in force does, None where there is no way."""
         way = self._ways.get(robot.id)
         if (
             way is not None
@@ -74,10 +71,7 @@ class Driver:
             and survey.is_free(ahead(robot, way.order.path_m))
         ):
             return []
-        path = belief.path(robot, goal_m)
-        bold = belief.path(robot, goal_m, optimistic=True)
-        if len(path) == 0 or (len(bold) > 0 and length_m(path) > DETOUR * length_m(bold) + MOVED_M):
-            path = bold
+        path = way_to(belief, robot, goal_m)
         if len(path) == 0:
             self._ways.pop(robot.id, None)
             return None
@@ -89,6 +83,15 @@ class Driver:
         """Return the order to stand still, nothing where the robot was told so already."""
         way = self._ways.pop(robot.id, None)
         return [stand(robot)] if way is not None or robot.target is not None else []
+
+
+def way_to(belief: Belief, robot: RobotView, goal_m: Point) -> tuple[Point, ...]:
+    """Return the way over known-free space where that is not much longer, else through unknown space taken as free."""
+    path = belief.path(robot, goal_m)
+    bold = belief.path(robot, goal_m, optimistic=True)
+    if len(path) == 0 or (len(bold) > 0 and length_m(path) > DETOUR * length_m(bold) + MOVED_M):
+        return bold
+    return path
 
 
 def length_m(path: tuple[Point, ...]) -> float:
