@@ -45,6 +45,10 @@ class Row:
     battery: float = 1.0
     gap: float = 0.0
 
+    @property
+    def cells(self) -> int:
+        return self.cols if self.rows == 0 else self.rows * self.cols
+
     def data(self, seed: int) -> dict[str, object]:
         if self.rows == 0:
             return metric_complete(self.cols, self.robots, seed)
@@ -156,10 +160,9 @@ def seeds_of(words: list[str]) -> list[int]:
 
 
 def line(row: Row, seed: int, solver: str, found: Outcome, remark: str) -> str:
-    cells = row.cols if row.rows == 0 else row.rows * row.cols
     gap = "-" if found.gap is None else f"{found.gap:.2e}"
     return (
-        f"{row.group:8}{cells:5d} {row.robots:6d} {row.horizon:4d} {row.battery:7g} {seed:4d} {solver:7} "
+        f"{row.group:8}{row.cells:5d} {row.robots:6d} {row.horizon:4d} {row.battery:7g} {seed:4d} {solver:7} "
         f"{found.status:9} {found.objective or 0.0:12.4f} {found.bound or 0.0:12.4f} {gap:>9} "
         f"{found.spent_s:8.3f} {row.limit_s:7g} {remark}"
     )
@@ -173,6 +176,7 @@ def main() -> None:
         help=f"rows of the table: {', '.join(groups)} (default: paper small medium binding)",
     )  # fmt: skip
     parser.add_argument("--seeds", nargs="+", default=["0"], help="numbers or ranges such as 0-4")
+    parser.add_argument("--most-cells", type=int, metavar="N", help="leave out instances with more cells")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument(
         "--peers", nargs="+", choices=PEERS, default=[], metavar="PEER",
@@ -195,7 +199,8 @@ def main() -> None:
         "group   cells robots    T battery seed solver  status       objective        bound       gap   time_s limit_s"
     )
     ratios: dict[str, list[float]] = {name: [] for name in [*options.peers, "best peer"]}
-    rows = [row for row in TABLE if row.group in options.groups]
+    most_cells = options.most_cells or math.inf
+    rows = [row for row in TABLE if row.group in options.groups and row.cells <= most_cells]
     for row, seed in ((row, seed) for row in rows for seed in seeds_of(options.seeds)):
         limit_s = options.limit_s or row.limit_s
         run = {**asdict(row), "seed": seed, "threads": options.threads, "limit_s": limit_s}
