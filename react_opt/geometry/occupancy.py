@@ -86,10 +86,11 @@ class OccupancyMap:
         FloatArray
             ``(..., 2)`` of (column, row), not rounded; points off the map are not clipped.
         """
-        offset = np.asarray(points_m, dtype=np.float64) - (self.origin_x_m, self.origin_y_m)
+        points = np.asarray(points_m, dtype=np.float64)
+        x, y = _columns(points)
+        x, y = x - self.origin_x_m, y - self.origin_y_m
         c, s = cos(self.origin_yaw_rad), sin(self.origin_yaw_rad)
-        x, y = offset[..., 0], offset[..., 1]
-        return np.stack((c * x + s * y, c * y - s * x), axis=-1) / self.resolution_m
+        return _joined((c * x + s * y) / self.resolution_m, (c * y - s * x) / self.resolution_m, points.shape)
 
     def pixel_to_world(self, pixels: ArrayLike) -> FloatArray:
         """Return the world points of continuous pixel coordinates: the inverse of :meth:`world_to_pixel`.
@@ -104,10 +105,11 @@ class OccupancyMap:
         FloatArray
             ``(..., 2)`` world points, m.
         """
-        scaled = np.asarray(pixels, dtype=np.float64) * self.resolution_m
+        points = np.asarray(pixels, dtype=np.float64)
+        x, y = _columns(points)
+        x, y = x * self.resolution_m, y * self.resolution_m
         c, s = cos(self.origin_yaw_rad), sin(self.origin_yaw_rad)
-        x, y = scaled[..., 0], scaled[..., 1]
-        return np.stack((self.origin_x_m + c * x - s * y, self.origin_y_m + s * x + c * y), axis=-1)
+        return _joined(self.origin_x_m + c * x - s * y, self.origin_y_m + s * x + c * y, points.shape)
 
     def values_at(self, points_m: ArrayLike) -> NDArray[np.uint8]:
         """Return what the map says at world points; a point off the map is :data:`UNKNOWN`.
@@ -121,3 +123,21 @@ class OccupancyMap:
         inside = np.all((index >= 0) & (index < (self.cols, self.rows)), axis=-1)
         at = np.where(inside[..., None], index, 0).astype(np.int64)
         return np.where(inside, self.cells[at[..., 1], at[..., 0]], UNKNOWN).astype(np.uint8)
+
+
+Coordinate = float | FloatArray
+
+
+def _columns(points: FloatArray) -> tuple[Coordinate, Coordinate]:
+    """Return the two coordinates of points; of a single one as plain numbers, which are far quicker to reckon with."""
+    if points.ndim == 1:
+        x, y = points.tolist()
+        return x, y
+    return points[..., 0], points[..., 1]
+
+
+def _joined(x: Coordinate, y: Coordinate, shape: tuple[int, ...]) -> FloatArray:
+    """Return points of a shape from their coordinates."""
+    points = np.empty(shape)
+    points[..., 0], points[..., 1] = x, y
+    return points
