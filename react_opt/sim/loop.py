@@ -278,7 +278,7 @@ class Simulation:
 
     def _apply_rules(self) -> None:
         assert self.rules is not None
-        self.rules.apply(self.t_s, {robot.id: self._view(robot) for robot in self.robots})
+        self.rules.apply(self.t_s, self._view)
 
     def _drive(self) -> None:
         """Move all robots by one tick, draw their energy, and see who has arrived or is stuck."""

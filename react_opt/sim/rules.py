@@ -21,11 +21,13 @@ Robots tell each other where they are and where they are going. Four times a sec
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from math import hypot, inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.kernels import kernel
 from react_opt.orchestrator.belief import RobotView
 from react_opt.orchestrator.fleet_belief import FleetBelief
 from react_opt.sim.record import Recorder
@@ -53,6 +55,7 @@ _REFUGE_S = 40.0
 _RETRY_S = 1.0
 
 Points = NDArray[np.float64]
+ViewOf = Callable[[SimRobot], RobotView]
 
 
 class Rules:
@@ -79,15 +82,15 @@ class Rules:
         self._heir: dict[str, str] = {}
         self._ways: dict[str, Points] = {}
 
-    def apply(self, t_s: float, views: dict[str, RobotView]) -> None:
+    def apply(self, t_s: float, view_of: ViewOf) -> None:
         """Apply the rules at an instant.
 
         Parameters
         ----------
         t_s
             Now, s.
-        views
-            The robots as the belief sees them.
+        view_of
+            Returns a robot as the belief sees it.
         """
         for robot in self._robots:
             if robot.speed_m_s > 0.0 or robot.turning_rad_s != 0.0:
@@ -97,7 +100,7 @@ class Rules:
         for robot in moving:
             robot.cap_m_s = inf
             if robot.yields_to is not None:
-                self._hold(robot, t_s, views)
+                self._hold(robot, t_s, view_of)
             elif not robot.path:
                 self._heir.pop(robot.id, None)
             if not robot.path:
@@ -105,7 +108,7 @@ class Rules:
         for robot in moving:
             self._claim(robot)
         for robot in moving:
-            self._look_ahead(robot, t_s, views)
+            self._look_ahead(robot, t_s, view_of)
 
     # --- ways ---
 
@@ -181,7 +184,7 @@ class Rules:
 
     # --- rules 2 to 4 ---
 
-    def _look_ahead(self, robot: SimRobot, t_s: float, views: dict[str, RobotView]) -> None:
+    def _look_ahead(self, robot: SimRobot, t_s: float, view_of: ViewOf) -> None:
         way = self._ways[robot.id]
         if len(way) < 2:
             return
@@ -197,7 +200,7 @@ class Rules:
             self._cap(robot, at * _SAMPLE_M)
             if self._goes_its_way(robot, other) and t_s < self._still[other.id] + PATIENCE_S:
                 continue
-            self._meet(robot, other, t_s, views)
+            self._meet(robot, other, t_s, view_of)
 
     def _goes_its_way(self, robot: SimRobot, other: SimRobot) -> bool:
         """Tell whether another robot drives, and not towards this one."""
@@ -223,27 +226,27 @@ class Rules:
         claim = self._claims.get(robot.id)
         return claim is not None and hypot(claim[0][0, 0] - robot.u_m, claim[0][0, 1] - robot.v_m) < 0.15
 
-    def _meet(self, robot: SimRobot, other: SimRobot, t_s: float, views: dict[str, RobotView]) -> None:
+    def _meet(self, robot: SimRobot, other: SimRobot, t_s: float, view_of: ViewOf) -> None:
         """Let one of two robots that meet make way."""
         if not other.alive:
-            self._try(robot, other, t_s, views, dead=True)
+            self._try(robot, other, t_s, view_of, dead=True)
             return
         first, second = (robot, other) if self._rank(robot) <= self._rank(other) else (other, robot)
         if second.yields_to == first.id or first.yields_to == second.id:
             return  # it is on its way
-        if self._try(second, first, t_s, views):
+        if self._try(second, first, t_s, view_of):
             return
-        if second.path or self._comes_out(second, first, t_s, views):
-            self._try(first, second, t_s, views)
+        if second.path or self._comes_out(second, first, t_s, view_of):
+            self._try(first, second, t_s, view_of)
 
-    def _comes_out(self, robot: SimRobot, other: SimRobot, t_s: float, views: dict[str, RobotView]) -> bool:
+    def _comes_out(self, robot: SimRobot, other: SimRobot, t_s: float, view_of: ViewOf) -> bool:
         """Let a robot that stands in a dead end drive out of it, past all that will make way; tell whether it can."""
         if robot.order is not None and robot.path:
             return False
         dead = [self._body(robot, one) for one in self._robots if not one.alive]
         bodies = np.concatenate(dead) if dead else np.empty((0, 3))
         way = self._discs(self._ways[other.id], self._room(robot, other) + ARRIVED_M)
-        path = self._belief.refuge(views[robot.id], bodies, way[::2], _REFUGE_S)
+        path = self._belief.refuge(view_of(robot), bodies, way[::2], _REFUGE_S)
         if not path:
             return False
         self._tell(robot, other, t_s, "comes out")
@@ -252,14 +255,12 @@ class Rules:
         self._first.add(robot.id)
         return True
 
-    def _try(
-        self, robot: SimRobot, other: SimRobot, t_s: float, views: dict[str, RobotView], dead: bool = False
-    ) -> bool:
+    def _try(self, robot: SimRobot, other: SimRobot, t_s: float, view_of: ViewOf, dead: bool = False) -> bool:
         """Let a robot make way for another one; tell whether it could."""
         if t_s < self._tried.get((robot.id, other.id), -inf) + _RETRY_S:
             return False
         self._tried[robot.id, other.id] = t_s
-        view = views[robot.id]
+        view = view_of(robot)
         others = [one for one in self._robots if one is not robot]
         bodies = np.concatenate([self._body(robot, one) for one in others])
         way = self._ways.get(other.id, np.array([(other.u_m, other.v_m)]))
@@ -301,7 +302,7 @@ class Rules:
     def _tell(self, robot: SimRobot, other: SimRobot, t_s: float, how: str) -> None:
         self._record.event(t_s, "yield", robot=robot.id, target=robot.target, reason=f"{how}: {other.id} comes first")
 
-    def _hold(self, robot: SimRobot, t_s: float, views: dict[str, RobotView]) -> None:
+    def _hold(self, robot: SimRobot, t_s: float, view_of: ViewOf) -> None:
         """Let a robot that made way go on when the other has passed."""
         assert robot.yields_to is not None
         other = self._by_id[robot.yields_to]
@@ -309,7 +310,7 @@ class Rules:
         if robot.path and not late and other.alive and other.path:
             return  # still on its way to the side
         if not late and other.alive and other.path:
-            mine = self._order_way(robot, views[robot.id])
+            mine = self._order_way(robot, view_of(robot))
             ahead = sampled([(robot.u_m, robot.v_m), *mine], _SAMPLE_M, LOOK_M)
             theirs = self._ways[other.id]
             gaps = np.hypot(*(ahead[:, None, :] - theirs[None, :, :]).transpose(2, 0, 1))
@@ -317,24 +318,42 @@ class Rules:
                 return
         robot.yields_to = None
         self._heir.pop(robot.id, None)
-        robot.follow(self._order_way(robot, views[robot.id]))
+        robot.follow(self._order_way(robot, view_of(robot)))
         self._ways[robot.id] = self._way(robot)
 
 
 def sampled(points: list[Point], step_m: float, far_m: float) -> Points:
     """Return points every ``step_m`` along a polyline, as far as ``far_m``, and its end where that is nearer."""
-    out = [points[0]]
-    left, total = step_m, 0.0
+    lengths: list[float] = []
+    total = 0.0
     for (x0, y0), (x1, y1) in itertools.pairwise(points):
-        length = hypot(x1 - x0, y1 - y0)
+        lengths.append(hypot(x1 - x0, y1 - y0))
+        total += lengths[-1]
+        if total > far_m + 2 * step_m:
+            break  # what comes after is too far away
+    corners = np.array(points[: len(lengths) + 1])
+    return _along(corners, np.array(lengths), step_m, far_m)
+
+
+@kernel
+def _along(corners: Points, lengths: NDArray[np.float64], step_m: float, far_m: float) -> Points:
+    """Return the points of :func:`sampled`, from the corners of a polyline and the lengths between them."""
+    out = np.empty((int(lengths.sum() / step_m) + lengths.shape[0] + 3, 2))
+    out[0] = corners[0]
+    count, left, total = 1, step_m, 0.0
+    for n in range(lengths.shape[0]):
+        x0, y0, x1, y1 = corners[n, 0], corners[n, 1], corners[n + 1, 0], corners[n + 1, 1]
         at = left
-        while at <= length:
-            out.append((x0 + (x1 - x0) * at / length, y0 + (y1 - y0) * at / length))
+        while at <= lengths[n]:
+            out[count, 0], out[count, 1] = x0 + (x1 - x0) * at / lengths[n], y0 + (y1 - y0) * at / lengths[n]
+            count += 1
             at += step_m
             total += step_m
             if total >= far_m:
-                return np.array(out)
-        left = at - length
-    if len(points) > 1 and points[-1] != out[-1]:
-        out.append(points[-1])
-    return np.array(out)
+                return out[:count].copy()
+        left = at - lengths[n]
+    last = corners[-1]
+    if out[count - 1, 0] != last[0] or out[count - 1, 1] != last[1]:
+        out[count] = last
+        count += 1
+    return out[:count].copy()
