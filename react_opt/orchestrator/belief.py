@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -146,6 +147,10 @@ class Belief(Protocol):
 
         Known-free space only, unless ``optimistic``: then unknown space counts as free.
         """
+        ...
+
+    def soonest_s(self, robots: Sequence[RobotView], points_m: FloatArray) -> FloatArray:
+        """Return time (s) until the first of some robots is at ``(n, 2)`` points over known-free space, NaN: no way."""
         ...
 
     def path(

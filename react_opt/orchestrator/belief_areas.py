@@ -7,8 +7,6 @@ from math import ceil, floor
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from react_opt.kernels import kernel
 from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget
@@ -20,12 +18,12 @@ from react_opt.orchestrator.belief_regions import (
     SUM_COL,
     SUM_ROW,
     IntArray,
+    joined_to_open,
     label_window,
+    look_at,
     missed_pixels,
     provably_unseen,
-    stand_for,
     touching,
-    unknown_around,
 )
 
 MIN_TARGET_M2 = 0.1
@@ -44,6 +42,9 @@ class _Area:
     a: int
     b: int
     window: IntArray
+    centre_px: tuple[float, float] = (0.0, 0.0)
+    """On the canvas: column and row."""
+    centre_m: tuple[float, float] = (0.0, 0.0)
     labels: range = range(0)
     stats: IntArray = field(default_factory=lambda: np.zeros((0, 5), dtype=np.int64))
     known: int = 0
@@ -150,7 +151,6 @@ class Areas:
         """Fit the areas' windows to a new canvas."""
         self._laid = self._map.window
         self._labels = np.full(self._map.deep.shape, -1, dtype=np.int32)
-        self._map.inside[:] = False
         for area in self._list:
             edges = []
             for start, first, count in (
@@ -160,7 +160,11 @@ class Areas:
                 ends = [ceil((edge - first) / self._map.k - 0.5 - 1e-9) for edge in (start, start + self._side)]
                 edges += [min(max(end, 0), count) for end in ends]
             area.window = np.array(edges, dtype=np.int64)
-            self._map.inside[area.window[0] : area.window[1], area.window[2] : area.window[3]] = True
+            centre = (self._origin + (np.array((area.a, area.b)) + 0.5) * self._side) - (self._map.col0, self._map.row0)
+            area.centre_px = (float(centre[0]), float(centre[1]))
+            x, y = self._map.to_world(centre)
+            area.centre_m = (float(x), float(y))
+        self._map.bound([area.window for area in self._list])
         self._map.touched[:] = True
 
     def _dirty(self, window: IntArray) -> bool:
@@ -215,55 +219,46 @@ class Areas:
         base = min((area.labels.start for area in self._list if len(area.labels)), default=0)
         rows, cols = (np.unique([area.window[n : n + 2] for area in self._list]) for n in (0, 2))
         pairs = touching(self._labels, rows, cols) - base
-        size = self._next - base
-        joined = np.arange(size)
-        if len(pairs):
-            graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
-            _, joined = connected_components(graph, directed=False)
-        open_ = np.zeros(size, dtype=np.bool_)
+        open_ = np.zeros(self._next - base, dtype=np.bool_)
         for area in self._list:
             if len(area.labels):
                 open_[area.labels.start - base : area.labels.stop - base] = area.stats[:, FRONTIER] > 0
-        good = np.zeros(size, dtype=np.bool_)
-        good[joined[open_]] = True
         counted = np.zeros(self._next + 1, dtype=np.bool_)
-        counted[base : base + size] = good[joined]
+        counted[base : self._next] = joined_to_open(pairs, open_)
         return counted
 
     def _make_targets(self, counted: Bools, reached: Bools) -> None:
         map_ = self._map
         side_m = map_.k * map_.frame.resolution_m
+        labels = np.concatenate([np.array(area.labels, dtype=np.int64) for area in self._list])
+        stats = np.concatenate([area.stats for area in self._list])
+        of = np.repeat(np.arange(len(self._list)), [len(area.labels) for area in self._list])
+        kept = counted[labels] & ~(stats[:, SIZE] * self._block_m2 < MIN_TARGET_M2)
+        labels, stats, of = labels[kept], stats[kept], of[kept]
+        centres = stats[:, (SUM_ROW, SUM_COL)] / stats[:, SIZE, None]
+        windows = np.array([area.window for area in self._list])[of]
         open_ = map_.deep | ((map_.known > 0) & (map_.solid == 0))
+        stands, openings = look_at(
+            self._labels, labels, windows, centres, stats[:, FRONTIER] > 0, open_, reached, counted, self._range_blocks
+        )
+        columns = (
+            map_.to_world((centres[:, ::-1] + 0.5) * map_.k).tolist(),
+            stands.tolist(),
+            map_.centres_m(stands).tolist(),
+            (stats[:, SIZE] * self._block_m2).tolist(),
+            (openings * self._block_m2).tolist(),
+            (stats[:, FRONTIER] * side_m).tolist(),
+        )
         found: dict[str, LocalTarget] = {}
-        for area in self._list:
-            for label, row in zip(area.labels, area.stats, strict=True):
-                if not counted[label] or row[SIZE] * self._block_m2 < MIN_TARGET_M2:
-                    continue
-                if label not in self._names:
-                    self._named += 1
-                    self._names[label] = f"u{self._named}"
-                centre = (row[SUM_COL] / row[SIZE], row[SUM_ROW] / row[SIZE])
-                stand = -1
-                if row[FRONTIER] > 0:
-                    stand = stand_for(
-                        self._labels, label, area.window, centre[1], centre[0], open_, reached, self._range_blocks
-                    )
-                opening = unknown_around(self._labels, counted, centre[1], centre[0], self._range_blocks, label)
-                x, y = map_.to_world((np.array(centre) + 0.5) * map_.k)
-                place = None
-                if stand >= 0:
-                    (at,) = map_.centres_m([stand])
-                    place = (float(at[0]), float(at[1]))
-                found[self._names[label]] = LocalTarget(
-                    id=self._names[label],
-                    area=area.id,
-                    x_m=float(x),
-                    y_m=float(y),
-                    stand_m=place,
-                    size_m2=float(row[SIZE] * self._block_m2),
-                    opening_m2=float(opening * self._block_m2),
-                    frontier_m=float(row[FRONTIER] * side_m),
-                )
+        for label, n, (x, y), stand, (stand_x, stand_y), size_m2, opening_m2, frontier_m in zip(
+            labels.tolist(), of.tolist(), *columns, strict=True
+        ):
+            if label not in self._names:
+                self._named += 1
+                self._names[label] = f"u{self._named}"
+            name = self._names[label]
+            place = (stand_x, stand_y) if stand >= 0 else None
+            found[name] = LocalTarget(name, self._list[n].id, x, y, place, size_m2, opening_m2, frontier_m)
         order = [name for name in self._targets if name in found]
         order += [name for name in found if name not in self._targets]
         self._targets = {name: found[name] for name in order}
@@ -273,10 +268,8 @@ class Areas:
         labels = np.array(area.labels, dtype=np.int64)
         unknown = int(area.stats[counted[labels], SIZE].sum()) * map_.k**2 if len(labels) else 0
         share = area.known / (area.known + unknown + area.missed) if area.known else 0.0
-        centre = (self._origin + (np.array((area.a, area.b)) + 0.5) * self._side) - (map_.col0, map_.row0)
-        x, y = map_.to_world(centre)
-        stand = _nearest(reached, area.window, centre[1] / map_.k, centre[0] / map_.k)
-        place = (float(x), float(y))
+        stand = _nearest(reached, area.window, area.centre_px[1] / map_.k, area.centre_px[0] / map_.k)
+        place = area.centre_m
         if stand >= 0:
             (at,) = map_.centres_m([stand])
             place = (float(at[0]), float(at[1]))
@@ -284,7 +277,7 @@ class Areas:
             closed = provably_unseen(self._labels, counted, area.window, map_.solid, reachable, self._range_blocks)
         else:
             closed = not area.free
-        return AreaView(area.id, float(x), float(y), place, share, bool(closed))
+        return AreaView(area.id, *area.centre_m, place, share, bool(closed))
 
 
 @kernel

@@ -15,6 +15,7 @@ part held in memory and grows.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, hypot
 
 import numpy as np
@@ -83,14 +84,23 @@ class BeliefMap:
             _count_all(near, disc)
         self.touched = np.zeros(blocks, dtype=np.bool_)
         """Blocks whose unknown or free state changed since somebody cleared this."""
-        self.inside = np.ones(blocks, dtype=np.bool_)
-        """Blocks of the areas: beyond them unknown space is not taken to be free."""
+        self.bound([np.array((0, blocks[0], 0, blocks[1]))])
         if self._prior is not None:
             rows, cols = np.indices(shape).reshape(2, -1)
             centres = np.stack((cols, rows), axis=1) + 0.5
             said = self._prior.values_at(self.to_world(centres)) == OCCUPIED
             rows, cols = rows[said] + low_row, cols[said] + low_col
             self._apply(rows, cols, np.full(len(rows), PRIOR_OCCUPIED, dtype=np.uint8))
+
+    def bound(self, windows: Sequence[IntArray]) -> None:
+        """Say where the areas are: first and one past the last row, then columns, of their blocks."""
+        self.inside = np.zeros(self.known.shape, dtype=np.bool_)
+        """Blocks of the areas: beyond them unknown space is not taken to be free."""
+        for r0, r1, c0, c1 in windows:
+            self.inside[r0:r1, c0:c1] = True
+        pixels = np.repeat(np.repeat(self.inside, self.k, axis=0), self.k, axis=1)
+        self._at_most: Cells = np.where(pixels, UNKNOWN, OCCUPIED).astype(np.uint8)
+        """What a pixel counts as where nothing has been observed: a cell shows the lesser of this and what it holds."""
 
     @property
     def window(self) -> tuple[int, int, int, int]:
@@ -148,9 +158,7 @@ class BeliefMap:
     def merged(self) -> OccupancyMap:
         """Return the map as observed; what lies beyond the areas and has not been seen counts as occupied."""
         x, y = self.frame.pixel_to_world((self.col0, self.row0))
-        seen = np.where(self.cells == PRIOR_OCCUPIED, UNKNOWN, self.cells).astype(np.uint8)
-        beyond = np.repeat(np.repeat(~self.inside, self.k, axis=0), self.k, axis=1)
-        seen[beyond & (seen == UNKNOWN)] = OCCUPIED
+        seen = np.minimum(self.cells, self._at_most)
         return OccupancyMap(seen, self.frame.resolution_m, float(x), float(y), self.frame.origin_yaw_rad)
 
     def to_canvas(self, points_m: ArrayLike) -> FloatArray:
@@ -168,9 +176,8 @@ class BeliefMap:
 
     def passable(self, layer: int, optimistic: bool) -> NDArray[np.bool_]:
         """Return the blocks on whose centre the disc of a layer's radius may stand."""
-        room = self.clear >= self.radii_m[layer] / self.frame.resolution_m - 1e-6
-        known = self.near[layer] == 0
-        return np.asarray(room & (known | self.inside) if optimistic else room & known)
+        least_px = self.radii_m[layer] / self.frame.resolution_m - 1e-6
+        return _passable(self.clear, self.near[layer], self.inside, np.float32(least_px), optimistic)
 
 
 def _disc(radius_px: float, k: int) -> IntArray:
@@ -183,6 +190,30 @@ def _disc(radius_px: float, k: int) -> IntArray:
         if hypot(max(abs(r) * k - k / 2, 0), max(abs(c) * k - k / 2, 0)) < radius_px
     ]
     return np.array(offsets, dtype=np.int64)
+
+
+@kernel
+def clear_at(clear: NDArray[np.float32], pixels: FloatArray, k: int, resolution_m: float) -> FloatArray:
+    """Return the clearances (m) of the blocks that ``(n, 2)`` canvas pixels (column, row) lie in or are nearest to."""
+    out = np.empty(pixels.shape[0])
+    for n in range(pixels.shape[0]):
+        c = int(min(max(pixels[n, 0] // k, 0.0), clear.shape[1] - 1.0))
+        r = int(min(max(pixels[n, 1] // k, 0.0), clear.shape[0] - 1.0))
+        out[n] = clear[r, c] * np.float32(resolution_m)
+    return out
+
+
+@kernel
+def _passable(
+    clear: NDArray[np.float32], near: NDArray[np.int16], inside: NDArray[np.bool_], least: np.float32, optimistic: bool
+) -> NDArray[np.bool_]:
+    """Return where a disc may stand: enough clearance, and nothing unknown around, or what is not taken to be free."""
+    rows, cols = clear.shape
+    out = np.empty((rows, cols), dtype=np.bool_)
+    for r in range(rows):
+        for c in range(cols):
+            out[r, c] = clear[r, c] >= least and (near[r, c] == 0 or (optimistic and inside[r, c]))
+    return out
 
 
 @kernel

@@ -2,21 +2,97 @@
 
 Nodes are the centres of passable blocks; moves lead to the 8 blocks around (a diagonal only between two passable
 ones) and cost their length times the mean slowness of their ends. The search is Dijkstra's with a wheel of buckets
-no wider than the cheapest move, which makes it exact without a heap.
+no wider than the cheapest move, which makes it exact without a heap. It stops where all that has been asked for is
+settled, and is taken up again when more is asked for.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from react_opt.energy import RobotProfile, speed_at
 from react_opt.geometry.occupancy import FloatArray
 from react_opt.kernels import kernel
 
 IntArray = NDArray[np.int64]
-Field = tuple[FloatArray, FloatArray, NDArray[np.int32]]
-"""Time (s, inf: no way), length (m) and the block before, for each block, row by row."""
+Numbers = NDArray[np.int32]
+Flags = NDArray[np.bool_]
+Slowness = NDArray[np.float32]
+
+
+class Field:
+    """Drives from some blocks to all others, worked out as far as they are asked for.
+
+    A search that is taken up again goes on exactly as if it had never stopped: what a field says does not depend on
+    what it was asked before. Inside, the grid has a rim of impassable blocks.
+
+    Parameters
+    ----------
+    slow
+        :func:`slowness`; a field is good as long as this holds.
+    starts
+        Numbers of the blocks to start from, row by row, none of them twice (they may be impassable: moves lead out).
+    side_m
+        Side of a block, m.
+    fastest_m_s
+        The largest speed.
+    """
+
+    def __init__(self, slow: Slowness, starts: Sequence[int], side_m: float, fastest_m_s: float) -> None:
+        rows, cols = slow.shape
+        self._cols, self._side_m = cols, side_m
+        self._rimmed = np.zeros((rows + 2, cols + 2), dtype=np.float32)
+        self._rimmed[1:-1, 1:-1] = slow
+        self._width_s = side_m / fastest_m_s
+        slowest = max(float(slow.max(initial=0.0)), 1.0 / fastest_m_s)
+        self._start_slow = np.float32(slowest)
+        size = self._rimmed.size
+        self._time_s = np.full(size, np.inf)
+        self._settled = np.zeros(size, dtype=np.bool_)
+        self._before, self._after, self._ahead = (np.empty(size, dtype=np.int32) for _ in range(3))
+        buckets = int(np.sqrt(2.0) * side_m * slowest / self._width_s) + 3
+        self._head = np.full(1 << (buckets - 1).bit_length(), -1, dtype=np.int32)
+        self._state = np.zeros(2, dtype=np.int64)
+        _begin(self._inside(starts), self._time_s, self._before, self._after, self._ahead, self._head, self._state)
+
+    def times_s(self, blocks: ArrayLike) -> FloatArray:
+        """Return s to blocks, infinite where there is no way."""
+        at = self._settle(blocks)
+        return np.asarray(self._time_s[at])
+
+    def lengths_m(self, blocks: ArrayLike) -> FloatArray:
+        """Return m to blocks on the ways that are fastest, 0 where there is none."""
+        return lengths(self._before, self._time_s, self._settle(blocks), self._rimmed.shape[1], self._side_m)
+
+    def way(self, block: int) -> IntArray:
+        """Return the blocks of the drive to one, pulled straight where that is no slower; empty without a way."""
+        (goal,) = self._settle([block])
+        way = way_to(self._rimmed, self._before, self._time_s, goal, self._side_m)
+        return np.asarray(way - 2 * (way // self._rimmed.shape[1]) - self._rimmed.shape[1] + 1)
+
+    def all_times_s(self) -> FloatArray:
+        """Return s to every block, row by row, infinite where there is no way."""
+        self._advance(np.array([-1], dtype=np.int64))
+        return self._time_s.reshape(self._rimmed.shape)[1:-1, 1:-1].ravel()
+
+    def _inside(self, blocks: ArrayLike) -> IntArray:
+        """Return the numbers of blocks in the grid with its rim."""
+        numbers = np.asarray(blocks, dtype=np.int64)
+        return np.asarray(numbers + 2 * (numbers // self._cols) + self._cols + 3)
+
+    def _settle(self, blocks: ArrayLike) -> IntArray:
+        at = self._inside(blocks)
+        self._advance(at)
+        return at
+
+    def _advance(self, goals: IntArray) -> None:
+        _search(
+            self._rimmed.ravel(), self._rimmed.shape[1], goals, self._side_m, self._width_s, self._start_slow,
+            self._time_s, self._settled, self._before, self._after, self._ahead, self._head, self._state,
+        )  # fmt: skip
 
 
 def slowness(
@@ -29,27 +105,6 @@ def slowness(
         profile.speed_min_m_s, profile.speed_max_m_s,
     )  # fmt: skip
     return out
-
-
-def search(slow: NDArray[np.float32], start: int, side_m: float, fastest_m_s: float, goals: IntArray) -> Field:
-    """Return the field of drives from a block; it may stop once all goals are reached.
-
-    Parameters
-    ----------
-    slow
-        :func:`slowness`.
-    start
-        Number of the block to start from (it may be impassable: moves lead out of it).
-    side_m
-        Side of a block, m.
-    fastest_m_s
-        The largest speed.
-    goals
-        Blocks that are wanted; empty for all.
-    """
-    top = float(slow.max(initial=0.0))
-    slowest = max(top, 1.0 / fastest_m_s)
-    return _search(slow, start, side_m, side_m / fastest_m_s, slowest, goals)
 
 
 @kernel
@@ -70,85 +125,117 @@ def _slowness(
 
 
 @kernel
+def _begin(
+    starts: IntArray,
+    time: FloatArray,
+    before: Numbers,
+    after: Numbers,
+    ahead: Numbers,
+    head: Numbers,
+    state: IntArray,
+) -> None:
+    """Put the blocks to start from into the first bucket."""
+    for n in range(starts.shape[0]):
+        start = starts[n]
+        time[start], before[start] = 0.0, -1
+        after[start], ahead[start] = head[0], -1
+        if head[0] >= 0:
+            ahead[head[0]] = start
+        head[0] = start
+    state[0], state[1] = starts.shape[0], 0
+
+
+@kernel
 def _search(
-    slow: NDArray[np.float32], start: int, side_m: float, width: float, slowest: float, goals: IntArray
-) -> tuple[FloatArray, FloatArray, NDArray[np.int32]]:
-    rows, cols = slow.shape
-    size = rows * cols
-    time = np.full(size, np.inf)
-    length = np.zeros(size)
-    before = np.full(size, -1, dtype=np.int32)
-    after = np.full(size, -1, dtype=np.int32)  # doubly linked lists, one per bucket
-    ahead = np.full(size, -1, dtype=np.int32)
-    closed = np.zeros(size, dtype=np.bool_)
-    wanted = np.zeros(size, dtype=np.bool_)
-    left = 0
+    slow: Slowness,
+    cols: int,
+    goals: IntArray,
+    side_m: float,
+    width: float,
+    start_slow: np.float32,
+    time: FloatArray,
+    settled: Flags,
+    before: Numbers,
+    after: Numbers,
+    ahead: Numbers,
+    head: Numbers,
+    state: IntArray,
+) -> None:
+    """Go on until the goals are settled (a goal of -1: everything) or nothing is left; all in place.
+
+    ``after`` and ``ahead`` are doubly linked lists of waiting blocks, one per bucket, from ``head`` on. ``state``
+    holds how many wait and the number of the bucket whose turn it is.
+    """
+    straight, slant = 0.5 * side_m, 0.5 * (side_m * np.sqrt(2.0))
+    mask = head.shape[0] - 1
+    waiting, bucket = state[0], state[1]
     for n in range(goals.shape[0]):
-        if not wanted[goals[n]]:
-            wanted[goals[n]] = True
-            left += 1
-    stop = left > 0
-    diagonal = side_m * np.sqrt(2.0)
-    buckets = int(diagonal * slowest / width) + 3
-    head = np.full(buckets, -1, dtype=np.int32)
-    time[start] = 0.0
-    head[0] = start
-    waiting, bucket = 1, 0
-    first = slow[start // cols, start % cols]
-    while waiting > 0:
-        slot = bucket % buckets
-        here = head[slot]
-        if here < 0:
-            bucket += 1
-            continue
-        head[slot] = after[here]
-        if after[here] >= 0:
-            ahead[after[here]] = -1
-        waiting -= 1
-        closed[here] = True
-        if wanted[here]:
-            left -= 1
-            if stop and left == 0:
-                break
-        r, c = here // cols, here % cols
-        mine = slow[r, c] if slow[r, c] > 0 else max(first, np.float32(slowest))
-        for dr in range(-1, 2):
-            u = r + dr
-            if u < 0 or u >= rows:
+        goal = goals[n]
+        while waiting > 0 and (goal < 0 or not settled[goal]):
+            here = head[bucket & mask]
+            if here < 0:
+                bucket += 1
                 continue
-            for dc in range(-1, 2):
-                v = c + dc
-                if v < 0 or v >= cols or slow[u, v] <= 0 or (dr == 0 and dc == 0):
-                    continue
-                if dr != 0 and dc != 0 and (slow[r, v] <= 0 or slow[u, c] <= 0):
-                    continue
-                there = u * cols + v
-                if closed[there]:
-                    continue
-                metres = diagonal if dr != 0 and dc != 0 else side_m
-                t = time[here] + metres * 0.5 * (mine + slow[u, v])
-                if t >= time[there]:
-                    continue
-                if time[there] < np.inf:  # take it out of its bucket
-                    old = int(time[there] / width) % buckets
-                    if ahead[there] >= 0:
-                        after[ahead[there]] = after[there]
+            following = after[here]
+            head[bucket & mask] = following
+            if following >= 0:
+                ahead[following] = -1
+            waiting -= 1
+            settled[here] = True
+            mine = slow[here] if slow[here] > 0 else start_slow
+            left, right = slow[here - 1] > 0, slow[here + 1] > 0
+            for dr in range(-1, 2):
+                middle = here + dr * cols
+                if dr != 0 and slow[middle] <= 0:
+                    continue  # no way straight there, so none across its corners
+                for dc in range(-1, 2):
+                    if (dc == 0 and dr == 0) or (dc < 0 and not left) or (dc > 0 and not right):
+                        continue
+                    there = middle + dc
+                    if slow[there] <= 0:
+                        continue
+                    t = time[here] + (slant if dr != 0 and dc != 0 else straight) * (mine + slow[there])
+                    known = time[there]
+                    if t >= known or settled[there]:
+                        continue
+                    if known < np.inf:  # take it out of its bucket
+                        low, high = after[there], ahead[there]
+                        if high >= 0:
+                            after[high] = low
+                        else:
+                            head[int(known / width) & mask] = low
+                        if low >= 0:
+                            ahead[low] = high
                     else:
-                        head[old] = after[there]
-                    if after[there] >= 0:
-                        ahead[after[there]] = ahead[there]
-                else:
-                    waiting += 1
-                time[there] = t
-                length[there] = length[here] + metres
-                before[there] = here
-                new = int(t / width) % buckets
-                after[there] = head[new]
-                ahead[there] = -1
-                if head[new] >= 0:
-                    ahead[head[new]] = there
-                head[new] = there
-    return time, length, before
+                        waiting += 1
+                    time[there], before[there] = t, here
+                    slot = int(t / width) & mask
+                    low = head[slot]
+                    after[there], ahead[there] = low, -1
+                    if low >= 0:
+                        ahead[low] = there
+                    head[slot] = there
+    state[0], state[1] = waiting, bucket
+
+
+@kernel
+def lengths(before: Numbers, time: FloatArray, goals: IntArray, cols: int, side_m: float) -> FloatArray:
+    """Return the lengths of the ways to goals, m, summed up from their starts on; 0 where there is no way."""
+    out = np.zeros(goals.shape[0])
+    slants = np.empty(before.shape[0], dtype=np.bool_)
+    diagonal = side_m * np.sqrt(2.0)
+    for n in range(goals.shape[0]):
+        if not np.isfinite(time[goals[n]]):
+            continue
+        count, at = 0, goals[n]
+        while before[at] >= 0:
+            gap = abs(at - before[at])
+            slants[count] = gap != 1 and gap != cols
+            count += 1
+            at = before[at]
+        for k in range(count - 1, -1, -1):
+            out[n] += diagonal if slants[k] else side_m
+    return out
 
 
 @kernel
@@ -166,10 +253,20 @@ def nearest_block(slow: NDArray[np.float32], x: float, y: float, reach: float) -
 
 
 @kernel
-def way_to(
-    slow: NDArray[np.float32], before: NDArray[np.int32], time: FloatArray, goal: int, side_m: float
-) -> IntArray:
-    """Return the blocks of the drive to a goal, the start first, pulled straight where that is free and no slower."""
+def nearest_blocks(slow: Slowness, points: FloatArray, reach: float) -> IntArray:
+    """Return :func:`nearest_block` of each of ``(n, 2)`` points (column, row)."""
+    out = np.empty(points.shape[0], dtype=np.int64)
+    for n in range(points.shape[0]):
+        out[n] = nearest_block(slow, points[n, 0], points[n, 1], reach)
+    return out
+
+
+@kernel
+def way_to(slow: Slowness, before: Numbers, time: FloatArray, goal: int, side_m: float) -> IntArray:
+    """Return the blocks of the drive to a goal, the start first, pulled straight where that is free and no slower.
+
+    All is in terms of the grid with its rim.
+    """
     if not np.isfinite(time[goal]):
         return np.empty(0, dtype=np.int64)
     count, at = 1, goal
@@ -202,18 +299,17 @@ def way_to(
 
 
 @kernel
-def _straight_s(slow: NDArray[np.float32], start: int, goal: int, side_m: float) -> float:
+def _straight_s(slow: Slowness, start: int, goal: int, side_m: float) -> float:
     """Return the time of a straight drive between two blocks, -1 where it leaves the passable blocks."""
     cols = slow.shape[1]
-    y0, x0 = start // cols, start % cols
-    y1, x1 = goal // cols, goal % cols
-    dx, dy = x1 - x0, y1 - y0
+    y0, x0 = start // cols - 1, start % cols - 1
+    dx, dy = goal % cols - 1 - x0, goal // cols - 1 - y0
     length = np.sqrt(float(dx * dx + dy * dy))
     pieces = int(2.0 * length) + 1
     total = 0.0
     for n in range(pieces):
         share = (n + 0.5) / pieces
-        value = slow[int(y0 + share * dy + 0.5), int(x0 + share * dx + 0.5)]
+        value = slow[1 + int(y0 + share * dy + 0.5), 1 + int(x0 + share * dx + 0.5)]
         if value <= 0:
             return -1.0
         total += value

@@ -163,29 +163,53 @@ def touching(labels: Labels, row_lines: IntArray, col_lines: IntArray) -> IntArr
 
 
 @kernel
+def joined_to_open(pairs: IntArray, open_: Bools) -> Bools:
+    """Return the regions that hang together with an open one; rows of ``pairs`` are regions that touch."""
+    root = np.arange(open_.shape[0])
+    for n in range(pairs.shape[0]):
+        a, b = pairs[n, 0], pairs[n, 1]
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        root[max(a, b)] = min(a, b)  # so that no region stands before its root
+    good = np.zeros(open_.shape[0], dtype=np.bool_)
+    for n in range(open_.shape[0]):
+        root[n] = root[root[n]]
+        good[root[n]] |= open_[n]
+    return good[root]
+
+
+@kernel
 def flood(passable: Bools, starts: IntArray) -> Bools:
     """Return the blocks that are reached from some through sides of passable ones (starts count in any case)."""
     rows, cols = passable.shape
-    reached = np.zeros(passable.shape, dtype=np.bool_)
-    stack = np.empty(passable.size + starts.shape[0], dtype=np.int64)
+    wide = cols + 2
+    closed = np.ones((rows + 2) * wide, dtype=np.bool_)  # with a rim; what has been reached is closed too
+    for r in range(rows):
+        for c in range(cols):
+            closed[(r + 1) * wide + c + 1] = not passable[r, c]
+    reached = np.zeros((rows + 2) * wide, dtype=np.bool_)
+    stack = np.empty(passable.size + starts.shape[0], dtype=np.int32)
     top = 0
     for n in range(starts.shape[0]):
-        r, c = starts[n] // cols, starts[n] % cols
-        if not reached[r, c]:
-            reached[r, c] = True
-            stack[top] = starts[n]
+        at = starts[n] + 2 * (starts[n] // cols) + wide + 1
+        if not reached[at]:
+            closed[at] = reached[at] = True
+            stack[top] = at
             top += 1
     while top > 0:
         top -= 1
-        r, c = stack[top] // cols, stack[top] % cols
-        for n in range(4):
-            p = r + (1 if n == 0 else -1 if n == 1 else 0)
-            q = c + (1 if n == 2 else -1 if n == 3 else 0)
-            if 0 <= p < rows and 0 <= q < cols and passable[p, q] and not reached[p, q]:
-                reached[p, q] = True
-                stack[top] = p * cols + q
+        at = stack[top]
+        for step in (1, -1, wide, -wide):
+            there = at + step
+            if not closed[there]:
+                closed[there] = reached[there] = True
+                stack[top] = there
                 top += 1
-    return reached
+    return reached.reshape(rows + 2, wide)[1:-1, 1:-1].copy()
 
 
 @kernel
@@ -268,6 +292,37 @@ def unknown_around(labels: Labels, counted: Bools, row: float, col: float, reach
             if label >= 0 and label != own and counted[label] and (r - row) ** 2 + (c - col) ** 2 <= reach * reach:
                 count += 4
     return count
+
+
+@kernel
+def look_at(
+    labels: Labels,
+    regions: IntArray,
+    windows: IntArray,
+    centres: NDArray[np.float64],
+    bordered: Bools,
+    open_: Bools,
+    reached: Bools,
+    counted: Bools,
+    range_blocks: float,
+) -> tuple[IntArray, IntArray]:
+    """Return for each of some regions :func:`stand_for` it and :func:`unknown_around` it.
+
+    Parameters
+    ----------
+    regions, windows, centres, bordered
+        Their numbers, the windows of their areas, their centroids (row, column), and whether they border free space
+        (others are not looked at from anywhere).
+    labels, open_, reached, counted, range_blocks
+        As there.
+    """
+    stands, around = np.full(regions.shape[0], -1, dtype=np.int64), np.empty(regions.shape[0], dtype=np.int64)
+    for n in range(regions.shape[0]):
+        row, col = centres[n, 0], centres[n, 1]
+        if bordered[n]:
+            stands[n] = stand_for(labels, regions[n], windows[n], row, col, open_, reached, range_blocks)
+        around[n] = unknown_around(labels, counted, row, col, range_blocks, regions[n])
+    return stands, around
 
 
 @kernel

@@ -19,8 +19,8 @@ from react_opt.geometry.raycast import ray_table, rays_px, unknown_ahead_px
 from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget, RobotView
 from react_opt.orchestrator.belief_areas import Areas
 from react_opt.orchestrator.belief_avoid import SLOWER, first_clear, without_discs
-from react_opt.orchestrator.belief_map import ROOM_M, BeliefMap
-from react_opt.orchestrator.belief_paths import Field, nearest_block, search, slowness, way_to
+from react_opt.orchestrator.belief_map import ROOM_M, BeliefMap, clear_at
+from react_opt.orchestrator.belief_paths import Field, Slowness, nearest_block, nearest_blocks, slowness
 from react_opt.orchestrator.belief_regions import flood
 
 SNAP_M = 0.5
@@ -30,7 +30,6 @@ BODY_MARGIN_M = 0.06
 """Room that is planned for between a robot and one that died, m."""
 
 IntArray = NDArray[np.int64]
-Slowness = NDArray[np.float32]
 _LOOK_RAYS = 360
 
 
@@ -80,7 +79,7 @@ class FleetBelief:
         self._reported = 0
         self._fresh = (-1, -1)
         self._slow: dict[tuple[int, bool], Slowness] = {}
-        self._fields: dict[tuple[int, bool, int], Field] = {}
+        self._fields: dict[tuple[int, bool, tuple[int, ...]], Field] = {}
         self._planned: tuple[int, tuple[str, ...]] = (-1, ())
         self._bodies_block = bodies_block
         self._marks = np.zeros((1, 1), dtype=np.int32)
@@ -182,8 +181,16 @@ class FleetBelief:
         self, robot: RobotView, points_m: ArrayLike, *, optimistic: bool = False
     ) -> tuple[FloatArray, FloatArray]:
         """Return time (s) and energy (J, without sensing) for a robot to drive to ``(n, 2)`` points, NaN: no way."""
-        field = self._field(robot.profile, self._start(robot.profile, (robot.x_m, robot.y_m), optimistic), optimistic)
-        return self._read(robot.profile, field, points_m, optimistic)
+        return self._read(robot.profile, self._field_from([robot], optimistic), points_m, optimistic)
+
+    def soonest_s(self, robots: Sequence[RobotView], points_m: ArrayLike) -> FloatArray:
+        """Return time (s) until the first of some robots is at ``(n, 2)`` points over known-free space, NaN: no way."""
+        points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
+        soonest = np.full(len(points), np.nan)
+        for profile in dict.fromkeys(robot.profile for robot in robots):
+            field = self._field_from([robot for robot in robots if robot.profile == profile], False)
+            soonest = np.fmin(soonest, self._times_s(field, self._blocks(self._slowness(profile, False), points)))
+        return soonest
 
     def path(
         self, robot: RobotView, goal_m: tuple[float, float], *, optimistic: bool = False
@@ -193,8 +200,7 @@ class FleetBelief:
         (goal,) = self._blocks(slow, [goal_m])
         if goal < 0:
             return ()
-        field = self._field(robot.profile, self._start(robot.profile, (robot.x_m, robot.y_m), optimistic), optimistic)
-        return self._way(slow, field, int(goal), robot)
+        return self._way(self._field_from([robot], optimistic), int(goal), robot)
 
     def table(self, profile: RobotProfile, points_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return time (s) and energy (J) between ``(n, 2)`` points over known-free space as ``(n, n)``, NaN: no way."""
@@ -203,7 +209,7 @@ class FleetBelief:
         starts = self._blocks(self._slowness(profile, False), points)
         for n, start in enumerate(starts):
             if start >= 0:
-                field = self._field(profile, int(start), False)
+                field = self._field(profile, (int(start),), False)
                 times[n], energies[n] = self._read(profile, field, points, False)
         return times, energies
 
@@ -230,7 +236,7 @@ class FleetBelief:
         if goal < 0:
             return np.inf, ()
         field = self._search(slow, robot)
-        return float(field[0][goal]), self._way(slow, field, int(goal), robot)
+        return float(field.times_s([goal])[0]), self._way(field, int(goal), robot)
 
     def refuge(
         self, robot: RobotView, blocked: ArrayLike, way: ArrayLike, longest_s: float
@@ -248,8 +254,8 @@ class FleetBelief:
         """
         slow = without_discs(self._slowness(robot.profile, False), self._discs(blocked), 0.0)
         field = self._search(slow, robot)
-        place = first_clear(field[0], slow.shape[1], self._discs(way), longest_s)
-        return () if place < 0 else self._way(slow, field, int(place), robot)
+        place = first_clear(field.all_times_s(), slow.shape[1], self._discs(way), longest_s)
+        return () if place < 0 else self._way(field, int(place), robot)
 
     def would_see(self, point_m: tuple[float, float], range_m: float) -> int:
         """Return how many unknown pixels a scan from a point would reveal if unknown space were free."""
@@ -267,10 +273,8 @@ class FleetBelief:
 
         As of the block that each lies in, up to about three robot radii.
         """
-        pixels = self._map.to_canvas(np.asarray(points_m, dtype=np.float64).reshape(-1, 2)) // self._map.k
-        rows, cols = self._map.clear.shape
-        at = np.clip(pixels, 0, (cols - 1, rows - 1)).astype(np.int64)
-        return np.asarray(self._map.clear[at[:, 1], at[:, 0]] * self._map.frame.resolution_m, dtype=np.float64)
+        pixels = self._map.to_canvas(np.asarray(points_m, dtype=np.float64).reshape(-1, 2))
+        return clear_at(self._map.clear, pixels, self._map.k, self._map.frame.resolution_m)
 
     # --- how it is worked out ---
 
@@ -294,17 +298,16 @@ class FleetBelief:
 
     def _start(self, profile: RobotProfile, point_m: tuple[float, float], optimistic: bool) -> int:
         """Return the block that a robot drives from: the nearest where it may stand, else its own."""
-        (block,) = self._blocks(self._slowness(profile, optimistic), [point_m])
+        x, y = (self._map.to_canvas(point_m) / self._map.k).tolist()
+        block = nearest_block(self._slowness(profile, optimistic), x, y, SNAP_M / self._side_m)
         if block >= 0:
             return int(block)
         rows, cols = self._map.clear.shape
-        x, y = self._map.to_canvas(point_m) / self._map.k
         return min(max(int(y), 0), rows - 1) * cols + min(max(int(x), 0), cols - 1)
 
     def _blocks(self, slow: Slowness, points_m: ArrayLike) -> IntArray:
         pixels = self._map.to_canvas(np.asarray(points_m, dtype=np.float64).reshape(-1, 2)) / self._map.k
-        reach = SNAP_M / self._side_m
-        return np.array([nearest_block(slow, x, y, reach) for x, y in pixels], dtype=np.int64)
+        return nearest_blocks(slow, pixels, SNAP_M / self._side_m)
 
     def _slowness(self, profile: RobotProfile, optimistic: bool) -> Slowness:
         self._forget()
@@ -312,7 +315,8 @@ class FleetBelief:
         if key not in self._slow:
             passable = self._map.passable(self._layer[profile], optimistic)
             slow = slowness(self._map.clear, passable, profile, self._map.frame.resolution_m)
-            self._slow[key] = without_discs(slow, self._discs(self._bodies(profile)), 0.0)
+            bodies = self._bodies(profile)
+            self._slow[key] = without_discs(slow, self._discs(bodies), 0.0) if bodies else slow
         return self._slow[key]
 
     def _dead(self) -> list[RobotView]:
@@ -323,23 +327,27 @@ class FleetBelief:
         reach = profile.radius_m + BODY_MARGIN_M
         return [(robot.x_m, robot.y_m, reach + robot.profile.radius_m) for robot in self._dead()]
 
-    def _field(self, profile: RobotProfile, start: int, optimistic: bool) -> Field:
-        slow = self._slowness(profile, optimistic)
-        key = (self._profiles.index(profile), optimistic, start)
+    def _field(self, profile: RobotProfile, starts: tuple[int, ...], optimistic: bool) -> Field:
+        slow = self._slowness(profile, optimistic)  # first of all: it forgets fields that are out of date
+        key = (self._profiles.index(profile), optimistic, starts)
         if key not in self._fields:
-            every = np.empty(0, dtype=np.int64)
-            self._fields[key] = search(slow, start, self._side_m, profile.speed_max_m_s, every)
+            self._fields[key] = Field(slow, starts, self._side_m, profile.speed_max_m_s)
         return self._fields[key]
+
+    def _field_from(self, robots: Sequence[RobotView], optimistic: bool) -> Field:
+        """Return the drives from where robots of one profile are: to each block by the robot that is there first."""
+        starts = {self._start(robot.profile, (robot.x_m, robot.y_m), optimistic) for robot in robots}
+        return self._field(robots[0].profile, tuple(sorted(starts)), optimistic)
 
     def _search(self, slow: Slowness, robot: RobotView) -> Field:
         """Search from the nearest block that is left to the robot, which may stand within a disc that is cut out."""
         (block,) = self._blocks(slow, [(robot.x_m, robot.y_m)])
         start = int(block) if block >= 0 else self._start(robot.profile, (robot.x_m, robot.y_m), False)
-        return search(slow, start, self._side_m, robot.profile.speed_max_m_s, np.empty(0, dtype=np.int64))
+        return Field(slow, (start,), self._side_m, robot.profile.speed_max_m_s)
 
-    def _way(self, slow: Slowness, field: Field, goal: int, robot: RobotView) -> tuple[tuple[float, float], ...]:
+    def _way(self, field: Field, goal: int, robot: RobotView) -> tuple[tuple[float, float], ...]:
         """Return the way points of a field to a block, the robot's place first; empty where there is no way."""
-        way = way_to(slow, field[2], field[0], goal, self._side_m)
+        way = field.way(goal)
         if way.size == 0:
             return ()
         points = [(float(x), float(y)) for x, y in self._map.centres_m(way)]
@@ -365,6 +373,16 @@ class FleetBelief:
     ) -> tuple[FloatArray, FloatArray]:
         """Return times and energies of a field at points."""
         blocks = self._blocks(self._slowness(profile, optimistic), points_m)
-        times, lengths = field[0][blocks], field[1][blocks]
-        times = np.where((blocks >= 0) & np.isfinite(times), times, np.nan)
-        return times, profile.drive_energy_j(np.where(np.isnan(times), np.nan, lengths), times)
+        times = self._times_s(field, blocks)
+        lengths = np.full(len(blocks), np.nan)
+        there = np.isfinite(times)
+        lengths[there] = field.lengths_m(blocks[there])
+        return times, profile.drive_energy_j(lengths, times)
+
+    @staticmethod
+    def _times_s(field: Field, blocks: IntArray) -> FloatArray:
+        """Return times of a field at blocks (-1: at none), NaN where there is no way."""
+        times = np.full(len(blocks), np.nan)
+        times[blocks >= 0] = field.times_s(blocks[blocks >= 0])
+        times[np.isinf(times)] = np.nan
+        return times

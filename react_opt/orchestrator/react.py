@@ -144,8 +144,7 @@ class React:
     def _targets(self, belief: Belief, robots: list[RobotView], notes: list[Note]) -> list[tuple[LocalTarget, float]]:
         """Return the targets that are not postponed, with their priorities (line 4)."""
         points = np.array([target.stand_m or (target.x_m, target.y_m) for target in self.targets]).reshape(-1, 2)
-        ways = [belief.costs(robot, points)[0] for robot in robots]
-        values = priorities(self.targets, np.fmin.reduce(ways) if ways else None)
+        values = priorities(self.targets, belief.soonest_s(robots, points) if robots else None)
         low = is_postponed(values, self.options.postpone_below) if self.postpones else np.zeros(len(values), bool)
         kept: list[tuple[LocalTarget, float]] = []
         postponed = set()

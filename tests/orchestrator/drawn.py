@@ -6,6 +6,7 @@ in line of sight within its range.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -118,6 +119,9 @@ class DrawnBelief:
         time_s = np.array([times[survey.block_of(*point)] for point in points_m])
         time_s[~np.isfinite(time_s)] = np.nan
         return time_s, time_s * (robot.profile.idle_w + robot.profile.motion_w)
+
+    def soonest_s(self, robots: Sequence[RobotView], points_m: FloatArray) -> FloatArray:
+        return np.asarray(np.fmin.reduce([self.costs(robot, points_m)[0] for robot in robots]))
 
     def path(
         self, robot: RobotView, goal_m: tuple[float, float], *, optimistic: bool = False

@@ -202,6 +202,32 @@ def test_layers_kept_up_to_date_are_those_worked_out_at_once(seed: int) -> None:
     assert np.array_equal(slow.map.cells, fast.map.cells)
 
 
+def test_the_soonest_of_robots_is_there_first_on_every_map() -> None:
+    """Two kinds of robots, asked anew after each change: the least of their own times, as of a belief made anew."""
+    slim = dataclasses.replace(PROFILE, length_m=0.3, width_m=0.2, speed_max_m_s=0.6)
+    truth = truth_of()
+    cells = truth.cells.copy()
+    cells[15:, 98:102] = 1
+    cells[40:45, 98:102] = 0  # the slim one alone gets through
+    robots = [
+        robot_at(2.05, 5.05), robot_at(3.0, 8.0, "r2"), dataclasses.replace(robot_at(8.0, 4.2, "r3"), profile=slim)
+    ]  # fmt: skip
+    belief = belief_of(truth, profiles=[PROFILE, slim])
+    goals = np.stack(np.meshgrid(np.linspace(0.5, 19.5, 12), np.linspace(0.5, 9.5, 6)), axis=-1).reshape(-1, 2)
+    for low, high in ((0, 60), (60, 120), (120, 200)):
+        shown(belief, OccupancyMap(cells, 0.1), low, high)
+        anew = belief_of(truth, profiles=[PROFILE, slim])
+        shown(anew, OccupancyMap(cells, 0.1), 0, high)
+        soonest_s = belief.soonest_s(robots, goals)
+        each = [anew.costs(robot, goals)[0] for robot in robots]
+        np.testing.assert_array_equal(soonest_s, np.fmin.reduce(each))
+        assert np.isfinite(soonest_s).sum() > high // 4
+    before_s = belief.soonest_s(robots[:2], goals)
+    belief.report(dataclasses.replace(robots[2], x_m=10.0, y_m=0.8, state="dead"))
+    after_s = belief.soonest_s(robots[:2], goals)  # the map is the same, and the way below the wall is closed now
+    assert np.isnan(after_s).sum() > np.isnan(before_s).sum()
+
+
 def test_clearances_are_distances_to_the_nearest_occupied_pixel() -> None:
     rng = np.random.default_rng(3)
     cells = (rng.random((100, 200)) < 0.01).astype(np.uint8)
