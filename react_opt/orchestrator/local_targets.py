@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from math import hypot
 
-import numpy as np
-
 from react_opt.orchestrator.belief import Belief, LocalTarget, RobotView
 from react_opt.orchestrator.regions import FREE_SHARE, Region, Regions
 from react_opt.orchestrator.strategy import Point
@@ -40,8 +38,8 @@ class LocalTargets:
         """Return the local targets that robots can reach over known-free space, in the order they appeared."""
         if not robots:
             return ()
-        times = [survey.times_from(robot.x_m, robot.y_m, optimistic=False) for robot in robots]
-        found = self.regions.find(survey, belief.areas, np.min(times, axis=0), looked_m, deep=False)
+        time_s = survey.times_from_nearest([(robot.x_m, robot.y_m) for robot in robots], optimistic=False)
+        found = self.regions.find(survey, belief.areas, time_s, looked_m, deep=False)
         named: dict[str, Region] = {}
         for name, before in self._named.items():
             near = [

@@ -23,11 +23,13 @@ from numpy.typing import NDArray
 from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
 from react_opt.orchestrator.guide import Guide
 from react_opt.orchestrator.orders import able
-from react_opt.orchestrator.regions import Region, Regions, seen_from
+from react_opt.orchestrator.regions import Region, Regions
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
 from react_opt.orchestrator.survey import COARSE, Block, Survey
-from react_opt.orchestrator.survey_kernels import OPEN, ways_out
+from react_opt.orchestrator.survey_drives import ways_out
+from react_opt.orchestrator.survey_kernels import OPEN
 from react_opt.orchestrator.tours import insert_all, plan_tours
+from react_opt.orchestrator.views import count_seen
 
 REPLAN_S = 3.0
 TRIES = 8
@@ -128,10 +130,9 @@ class ReactPlus:
             shape = self.survey.hidden.shape
             inside = (rows < shape[0]) & (cols < shape[1])
             hidden = goal.blocks[inside][self.survey.hidden[rows[inside], cols[inside]] > 0]
-            view = np.array([goal.view], dtype=np.int64)
             reach = self.regions.range_m / self.survey.block_m
             # what is hidden still but not in sight from the place to look from is no reason to go there
-            if seen_from(self.survey.blocks, view, hidden, COARSE, reach)[0] <= GONE * len(rows):
+            if count_seen(self.survey.blocks, *goal.view, hidden, COARSE, reach, 0.0) <= GONE * len(rows):
                 notes.append(Note("target_inspected", robot=robot.id, target=name))
                 return True
         return False

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from react_opt.kernels import kernel
 from react_opt.orchestrator.belief import AreaView
 from react_opt.orchestrator.strategy import Point
 from react_opt.orchestrator.survey import COARSE, Block, Cluster, Survey
-from react_opt.orchestrator.survey_kernels import SOLID
+from react_opt.orchestrator.views import best_view
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -43,8 +44,6 @@ LOOKS_M = (0.0, 0.8, 1.6, 2.6, 4.0)
 LOOK_ANGLES = 12
 """Places to look from are tried around the middle of the frontier at these distances and so many directions."""
 LOOKED_BLOCKS = 2  # coarse blocks around where a robot looked from that are no place to look from again
-ENOUGH = 0.75
-"""A place that sees this share of what the best place sees will do, if it is nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,16 +143,17 @@ class Regions:
             labels[cluster.blocks[:, 0], cluster.blocks[:, 1]] = n
         area_of = self.areas_of_blocks(survey, areas)
         block_m2 = survey.block_m**2 * FREE_SHARE
+        reached = np.isfinite(time_s)
         near, size, behind, owner, depth = share_out(
-            survey.hidden, labels, len(clusters), area_of, len(areas), np.isfinite(time_s),
+            survey.hidden, labels, len(clusters), area_of, len(areas), reached,
             MEAN_FREE_M / survey.coarse_m,
             DEEP_M / survey.coarse_m,
         )  # fmt: skip
-        fresh = np.isfinite(time_s)
+        may_stand = reached.copy()
         for point in looked_m:
             row, col = survey.block_of(*point)
             low_row, low_col = max(0, row - LOOKED_BLOCKS), max(0, col - LOOKED_BLOCKS)
-            fresh[low_row : row + LOOKED_BLOCKS + 1, low_col : col + LOOKED_BLOCKS + 1] = False
+            may_stand[low_row : row + LOOKED_BLOCKS + 1, low_col : col + LOOKED_BLOCKS + 1] = False
         grounds = _grounds(owner, len(clusters))
         members = [ground[depth[ground[:, 0], ground[:, 1]] <= 3.0 / survey.coarse_m] for ground in grounds]
         found = []
@@ -161,7 +161,7 @@ class Regions:
             value = min(float(near[n]) * block_m2, MOST_PER_M * cluster.length_m)
             if value < LEAST_M2:
                 continue
-            view, share = self._view(survey, cluster, members[n], np.where(fresh, time_s, np.inf))
+            view, share = self._view(survey, cluster, members[n], time_s, may_stand)
             if view is None or value * share < LEAST_M2:
                 continue
             row, col = survey.block_of(cluster.x_m, cluster.y_m)
@@ -183,7 +183,7 @@ class Regions:
             if area.unreachable or value < LEAST_DEEP_M2:
                 continue
             middle = (int(behind[n, 1] / behind[n, 0]), int(behind[n, 2] / behind[n, 0]))
-            block = survey.nearest_block(middle, np.isfinite(time_s) & (survey.hidden > 0), 30)
+            block = survey.nearest_block(middle, reached & (survey.hidden > 0), 30)
             if block is not None:
                 at = survey.point_of(block)
                 size_m2 = float(behind[n, 0]) * survey.block_m**2
@@ -191,32 +191,27 @@ class Regions:
         return found
 
     def _view(
-        self, survey: Survey, cluster: Cluster, hidden: IntArray, time_s: FloatArray
+        self, survey: Survey, cluster: Cluster, hidden: IntArray, time_s: FloatArray, may_stand: NDArray[np.bool_]
     ) -> tuple[Block | None, float]:
         """Return the nearest place that sees enough of a region (None where none does), and what share it sees."""
-        middle = survey.to_blocks((cluster.x_m, cluster.y_m)) / COARSE
-        places: dict[Block, None] = {}
-        for radius_m in LOOKS_M:
-            for n in range(LOOK_ANGLES if radius_m > 0 else 1):
-                angle = 2 * np.pi * n / LOOK_ANGLES
-                reach = radius_m / survey.coarse_m
-                row, col = int(middle[1] + reach * np.sin(angle)), int(middle[0] + reach * np.cos(angle))
-                if 0 <= row < time_s.shape[0] and 0 <= col < time_s.shape[1] and np.isfinite(time_s[row, col]):
-                    places[row, col] = None
-        near = survey.nearest_block((int(middle[1]), int(middle[0])), np.isfinite(time_s), 8)
-        if near is not None:
-            places[near] = None
-        if not places:
-            return None, 0.0
-        candidates = np.array(list(places), dtype=np.int64)
+        x, y = (survey.to_blocks((cluster.x_m, cluster.y_m)) / COARSE).tolist()
         targets = hidden if len(hidden) else cluster.blocks
-        seen = seen_from(survey.blocks, candidates, targets, COARSE, self.range_m / survey.block_m)
-        if seen.max() == 0:
-            return None, 0.0
-        good = seen >= ENOUGH * seen.max()
-        times = np.where(good, time_s[candidates[:, 0], candidates[:, 1]], np.inf)
-        best = candidates[int(np.argmin(times))]
-        return (int(best[0]), int(best[1])), float(seen[int(np.argmin(times))]) / len(targets)
+        reach = self.range_m / survey.block_m
+        offsets = _offsets(survey.coarse_m)
+        row, col, seen = best_view(survey.blocks, time_s, may_stand, y, x, offsets, targets, COARSE, reach)
+        return ((row, col), seen / len(targets)) if seen else (None, 0.0)
+
+
+@lru_cache(maxsize=8)
+def _offsets(coarse_m: float) -> FloatArray:
+    """Return ``(n, 2)`` rows and columns of the places to look from, against the middle of a frontier."""
+    offsets = []
+    for radius_m in LOOKS_M:
+        reach = radius_m / coarse_m
+        for n in range(LOOK_ANGLES if radius_m > 0 else 1):
+            angle = 2 * np.pi * n / LOOK_ANGLES
+            offsets.append((reach * np.sin(angle), reach * np.cos(angle)))
+    return np.array(offsets)
 
 
 def _grounds(owner: IntArray, count: int) -> list[IntArray]:
@@ -298,25 +293,3 @@ def share_out(
                 behind[area_of[r, c], 1] += rest * r
                 behind[area_of[r, c], 2] += rest * c
     return near, size, behind, owner, depth
-
-
-@kernel
-def seen_from(blocks: NDArray[np.uint8], places: IntArray, targets: IntArray, coarse: int, reach: float) -> IntArray:
-    """Return how many of some coarse blocks are in line of sight of each of some others, hidden ones being clear."""
-    seen = np.zeros(places.shape[0], dtype=np.int64)
-    for n in range(places.shape[0]):
-        y0, x0 = (places[n, 0] + 0.5) * coarse, (places[n, 1] + 0.5) * coarse
-        for k in range(targets.shape[0]):
-            dy, dx = (targets[k, 0] + 0.5) * coarse - y0, (targets[k, 1] + 0.5) * coarse - x0
-            gap = np.hypot(dx, dy)
-            if gap > reach:
-                continue
-            pieces = int(gap) + 1
-            clear = True
-            for p in range(1, pieces):
-                if blocks[int(y0 + dy * p / pieces), int(x0 + dx * p / pieces)] == SOLID:
-                    clear = False
-                    break
-            if clear:
-                seen[n] += 1
-    return seen

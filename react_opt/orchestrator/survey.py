@@ -16,13 +16,14 @@ from scipy import ndimage
 
 from react_opt.energy import RobotProfile
 from react_opt.geometry.occupancy import OCCUPIED, OccupancyMap
+from react_opt.orchestrator.survey_drives import drive_times, nearest_passable, rimmed, way_is_free
 from react_opt.orchestrator.survey_kernels import (
     coarse_blocks,
-    drive_times,
+    cut,
+    newly_solid,
     stamp_clearance,
     survey_blocks,
     view_gain,
-    way_is_free,
 )
 
 FloatArray = NDArray[np.float64]
@@ -71,7 +72,7 @@ class Survey:
         self.radius_m = max(profile.radius_m for profile in profiles)
         self.profile = min(profiles, key=lambda profile: profile.speed_max_m_s)
         self.version = -1
-        self._solid: NDArray[np.bool_] | None = None
+        self._cells: NDArray[np.uint8] = np.zeros((0, 0), dtype=np.uint8)
         self._frame: tuple[float, ...] = ()
 
     def update(self, source: OccupancyMap, version: int) -> None:
@@ -84,16 +85,13 @@ class Survey:
         self.block_m = self.k * res
         self.coarse_m = COARSE * self.block_m
         reach_px = max(self.radius_m, self.profile.full_speed_clearance_m) / res
-        solid = source.cells == OCCUPIED
         self.blocks = survey_blocks(source.cells, self.k)
         frame = (res, source.origin_x_m, source.origin_y_m, *map(float, source.cells.shape))
-        if frame != self._frame or self._solid is None or bool((self._solid & ~solid).any()):
-            self._frame = frame
+        new, kept = newly_solid(self._cells, source.cells) if frame == self._frame else (None, False)
+        if new is None or not kept:
             self._clear_px = np.full(self.blocks.shape, reach_px)
-            new = np.argwhere(solid)
-        else:
-            new = np.argwhere(solid & ~self._solid)
-        self._solid = solid
+            new = np.argwhere(source.cells == OCCUPIED)
+        self._frame, self._cells = frame, source.cells.copy()
         stamp_clearance(self._clear_px, new, self.k, reach_px)
         self.known, self.may, clear_px, self.border, self.hidden, self.best = coarse_blocks(
             self.blocks, self._clear_px, self.radius_m / res - 1e-6, COARSE
@@ -103,6 +101,7 @@ class Survey:
         sizes[0] = 0
         self.main = parts == np.argmax(sizes) if sizes.any() else self.may  # apart from islands among obstacles
         speed = self.profile.speed_m_s(clear_px * res, self.radius_m)
+        self._slow: dict[bool, FloatArray] = {}  # of this map, by whether unknown space counts as free
         self.slowness = np.where(self.known, 1.0, HIDDEN_SLOWER) * self.coarse_m / speed
 
     # --- places ---
@@ -113,9 +112,9 @@ class Survey:
 
     def block_of(self, x_m: float, y_m: float) -> Block:
         """Return the coarse block that a point lies in, the nearest one of the map."""
-        x, y = self.to_blocks((x_m, y_m)) / COARSE
+        x, y = (self.to_blocks((x_m, y_m)) / COARSE).tolist()
         rows, cols = self.known.shape
-        return int(np.clip(y, 0, rows - 1)), int(np.clip(x, 0, cols - 1))
+        return int(min(max(y, 0), rows - 1)), int(min(max(x, 0), cols - 1))
 
     def point_of(self, block: Block) -> tuple[float, float]:
         """Return where in a coarse block a robot has most clearance, m; its centre where it cannot stand there."""
@@ -129,13 +128,8 @@ class Survey:
 
     def nearest_block(self, block: Block, passable: NDArray[np.bool_], reach: int) -> Block | None:
         """Return the passable coarse block nearest to one, within a number of rows and columns, None for none."""
-        low_row, low_col = max(0, block[0] - reach), max(0, block[1] - reach)
-        window = np.argwhere(passable[low_row : block[0] + reach + 1, low_col : block[1] + reach + 1])
-        if len(window) == 0:
-            return None
-        gap = (window[:, 0] + low_row - block[0]) ** 2 + (window[:, 1] + low_col - block[1]) ** 2
-        row, col = window[int(np.argmin(gap))]
-        return int(row) + low_row, int(col) + low_col
+        row, col = nearest_passable(passable, block[0], block[1], reach)
+        return (row, col) if row >= 0 else None
 
     # --- driving ---
 
@@ -145,11 +139,16 @@ class Survey:
         Over known-free blocks only, unless ``optimistic``. A point that lies in no such block starts from the
         nearest one.
         """
-        passable = self.may if optimistic else self.known
-        block = self.nearest_block(self.block_of(x_m, y_m), self.main if optimistic else passable, 10)
-        if block is None:
-            return np.full(passable.shape, np.inf)
-        return drive_times(passable, self.slowness, block[0], block[1])
+        return self.times_from_nearest([(x_m, y_m)], optimistic=optimistic)
+
+    def times_from_nearest(self, points_m: Sequence[tuple[float, float]], *, optimistic: bool) -> FloatArray:
+        """Return ``(rows, cols)`` s to every coarse block from the point from where it takes least."""
+        start_in = self.main if optimistic else self.known
+        blocks = [self.nearest_block(self.block_of(*point), start_in, 10) for point in points_m]
+        starts = np.array([block for block in blocks if block is not None], dtype=np.int64).reshape(-1, 2)
+        if optimistic not in self._slow:
+            self._slow[optimistic] = rimmed(self.may if optimistic else self.known, self.slowness)
+        return np.asarray(drive_times(self._slow[optimistic], starts))
 
     def is_free(self, way_m: ArrayLike) -> bool:
         """Tell whether nothing known blocks a way of ``(n, 2)`` points, m."""
@@ -173,29 +172,18 @@ class Survey:
             Larger pieces are cut in two across their longer side until they are not.
         """
         labels, count = ndimage.label(self.border > 0, structure=np.ones((3, 3)))
-        if count == 0:
-            return []
         at = np.argwhere(labels > 0)
         of = labels[at[:, 0], at[:, 1]]
-        order = np.argsort(of, kind="stable")
-        pieces = np.split(at[order], np.flatnonzero(np.diff(of[order])) + 1)
-        result = []
-        while pieces:
-            piece = pieces.pop(0)
-            length_m = float(self.border[piece[:, 0], piece[:, 1]].sum()) * self.block_m
-            if length_m < shortest_m:
-                continue
-            extent = np.ptp(piece, axis=0)
-            axis = int(np.argmax(extent))
-            if extent[axis] * self.coarse_m > widest_m:
-                low = piece[:, axis] <= piece[:, axis].min() + extent[axis] // 2
-                pieces[:0] = [piece[low], piece[~low]]
-                continue
-            middle = piece[np.argmin(((piece - piece.mean(axis=0)) ** 2).sum(axis=1))]
-            side = COARSE * self.k
-            x, y = self.map.pixel_to_world(((middle[1] + 0.5) * side, (middle[0] + 0.5) * side))
-            result.append(Cluster(piece, float(x), float(y), length_m))
-        return result
+        at = at[np.argsort(of, kind="stable")]
+        begin = np.concatenate(([0], np.cumsum(np.bincount(of, minlength=count + 1)[1:])))
+        first, last, middle, length = cut(at, begin, self.border, shortest_m, widest_m, self.block_m, self.coarse_m)
+        places = self.map.pixel_to_world((at[middle][:, ::-1] + 0.5) * (COARSE * self.k))
+        return [
+            Cluster(at[low:high], x, y, blocks * self.block_m)
+            for low, high, (x, y), blocks in zip(
+                first.tolist(), last.tolist(), places.tolist(), length.tolist(), strict=True
+            )
+        ]
 
     def gain_m2(self, x_m: float, y_m: float, range_m: float, mean_free_m: float, rays: int = 120) -> float:
         """Return the hidden area (m^2) that a scan from a point is expected to reveal.

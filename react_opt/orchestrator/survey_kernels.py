@@ -23,25 +23,50 @@ def survey_blocks(cells: Grid, k: int) -> Grid:
     Hidden blocks lie in a 2 x 2 square of blocks of which nothing is known. The rays of a LiDAR diverge: single
     unknown blocks between them are no unexplored space.
     """
-    rows, cols = (cells.shape[0] + k - 1) // k, (cells.shape[1] + k - 1) // k
-    blocks = np.full((rows, cols), BLURRED, dtype=np.uint8)
-    for r in range(cells.shape[0]):
-        for c in range(cells.shape[1]):
-            value = cells[r, c]
-            if value == 1:
-                blocks[r // k, c // k] = SOLID
-            elif value == 0 and blocks[r // k, c // k] == BLURRED:
-                blocks[r // k, c // k] = OPEN
+    height, width = cells.shape
+    rows, cols = (height + k - 1) // k, (width + k - 1) // k
+    blocks = np.empty((rows, cols), dtype=np.uint8)
+    blank = np.empty((rows, cols), dtype=np.bool_)
+    free, solid = np.empty(cols * k, dtype=np.bool_), np.empty(cols * k, dtype=np.bool_)
+    for r in range(rows):
+        free[:] = False
+        solid[:] = False
+        for y in range(r * k, min((r + 1) * k, height)):
+            row = cells[y]
+            for x in range(width):
+                free[x] |= row[x] == 0
+                solid[x] |= row[x] == 1
+        for c in range(cols):
+            some_free, some_solid = False, False
+            for x in range(c * k, (c + 1) * k):
+                some_free |= free[x]
+                some_solid |= solid[x]
+            blocks[r, c] = SOLID if some_solid else OPEN if some_free else BLURRED
+            blank[r, c] = not (some_solid or some_free)
+    square = np.zeros((rows + 1, cols + 1), dtype=np.bool_)  # of blank blocks around each corner
     for r in range(rows - 1):
         for c in range(cols - 1):
-            if (
-                blocks[r, c] >= HIDDEN
-                and blocks[r, c + 1] >= HIDDEN
-                and blocks[r + 1, c] >= HIDDEN
-                and blocks[r + 1, c + 1] >= HIDDEN
-            ):
-                blocks[r, c] = blocks[r, c + 1] = blocks[r + 1, c] = blocks[r + 1, c + 1] = HIDDEN
+            square[r + 1, c + 1] = blank[r, c] & blank[r, c + 1] & blank[r + 1, c] & blank[r + 1, c + 1]
+    for r in range(rows):
+        for c in range(cols):
+            if square[r, c] | square[r, c + 1] | square[r + 1, c] | square[r + 1, c + 1]:
+                blocks[r, c] = HIDDEN
     return blocks
+
+
+@kernel
+def newly_solid(before: Grid, now: Grid) -> tuple[IntArray, bool]:
+    """Return ``(n, 2)`` rows and columns of the pixels that have become occupied, and whether none ceased to be."""
+    found = np.empty((now.size, 2), dtype=np.int64)
+    count, kept = 0, True
+    for r in range(now.shape[0]):
+        for c in range(now.shape[1]):
+            if now[r, c] == 1 and before[r, c] != 1:
+                found[count, 0], found[count, 1] = r, c
+                count += 1
+            elif now[r, c] != 1 and before[r, c] == 1:
+                kept = False
+    return found[:count].copy(), kept
 
 
 @kernel
@@ -91,124 +116,32 @@ def coarse_blocks(
     best_clear = np.zeros(shape)
     border, hidden = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
     best = np.full(shape, -1, dtype=np.int64)
-    for r in range(rows):
-        for c in range(cols):
-            value = blocks[r, c]
-            if value == SOLID:
-                continue
-            a, b = r // m, c // m
-            if value == HIDDEN:
-                hidden[a, b] += 1
-            elif value == OPEN and (
-                (r > 0 and blocks[r - 1, c] == HIDDEN)
-                or (r + 1 < rows and blocks[r + 1, c] == HIDDEN)
-                or (c > 0 and blocks[r, c - 1] == HIDDEN)
-                or (c + 1 < cols and blocks[r, c + 1] == HIDDEN)
-            ):
-                border[a, b] += 1
-            if clear[r, c] < contact:
-                continue
-            may[a, b] = True
-            if value == OPEN and not known[a, b]:
-                known[a, b] = True
-                best_clear[a, b] = 0.0
-            if (value == OPEN or not known[a, b]) and clear[r, c] > best_clear[a, b]:
-                best_clear[a, b] = clear[r, c]
-                best[a, b] = r * cols + c
+    for a in range(shape[0]):
+        for b in range(shape[1]):
+            for r in range(a * m, min((a + 1) * m, rows)):
+                for c in range(b * m, min((b + 1) * m, cols)):
+                    value = blocks[r, c]
+                    if value == SOLID:
+                        continue
+                    if value == HIDDEN:
+                        hidden[a, b] += 1
+                    elif value == OPEN and (
+                        (r > 0 and blocks[r - 1, c] == HIDDEN)
+                        or (r + 1 < rows and blocks[r + 1, c] == HIDDEN)
+                        or (c > 0 and blocks[r, c - 1] == HIDDEN)
+                        or (c + 1 < cols and blocks[r, c + 1] == HIDDEN)
+                    ):
+                        border[a, b] += 1
+                    if clear[r, c] < contact:
+                        continue
+                    may[a, b] = True
+                    if value == OPEN and not known[a, b]:
+                        known[a, b] = True
+                        best_clear[a, b] = 0.0
+                    if (value == OPEN or not known[a, b]) and clear[r, c] > best_clear[a, b]:
+                        best_clear[a, b] = clear[r, c]
+                        best[a, b] = r * cols + c
     return known, may, best_clear, border, hidden, best
-
-
-@kernel
-def drive_times(passable: Flags, slowness: FloatArray, row: int, col: int) -> FloatArray:
-    """Return s from a block to every block over eight neighbours, infinite where there is no way.
-
-    ``slowness`` is what crossing a block costs, s. A diagonal step needs one of the two blocks beside it. Dijkstra's
-    search with a ring of buckets as wide as the cheapest crossing: no order within a bucket matters.
-    """
-    rows, cols = passable.shape
-    cost = np.full((rows, cols), np.inf)
-    if not passable[row, col]:
-        return cost
-    least, most, count = np.inf, 0.0, 0
-    for r in range(rows):
-        for c in range(cols):
-            if passable[r, c]:
-                least, most = min(least, slowness[r, c]), max(most, slowness[r, c])
-                count += 1
-    ring = int(1.5 * most / least) + 3
-    head = np.full(ring, -1, dtype=np.int64)
-    after = np.empty(count * 8 + 8, dtype=np.int64)
-    item = np.empty(count * 8 + 8, dtype=np.int64)
-    used, queued, turn = 1, 1, 0
-    cost[row, col] = 0.0
-    head[0], after[0], item[0] = 0, -1, row * cols + col
-    done = np.zeros((rows, cols), dtype=np.bool_)
-    while queued > 0:
-        here = turn % ring
-        while head[here] >= 0:
-            at = head[here]
-            head[here] = after[at]
-            queued -= 1
-            r, c = item[at] // cols, item[at] % cols
-            if done[r, c]:
-                continue
-            done[r, c] = True
-            for dr in range(-1, 2):
-                for dc in range(-1, 2):
-                    y, x = r + dr, c + dc
-                    if not (0 <= y < rows and 0 <= x < cols) or not passable[y, x] or done[y, x]:
-                        continue
-                    if dr != 0 and dc != 0 and not (passable[r, x] or passable[y, c]):
-                        continue
-                    step = 0.7071067811865476 if dr != 0 and dc != 0 else 0.5
-                    reached = cost[r, c] + step * (slowness[r, c] + slowness[y, x])
-                    if reached < cost[y, x]:
-                        cost[y, x] = reached
-                        bucket = int(reached / least) % ring
-                        after[used], item[used] = head[bucket], y * cols + x
-                        head[bucket] = used
-                        used += 1
-                        queued += 1
-        turn += 1
-    return cost
-
-
-@kernel
-def ways_out(cost: FloatArray, places: NDArray[np.int64], near: float) -> NDArray[np.int64]:
-    """Return by which block the quickest way to each of some places leaves the block that a field starts from.
-
-    Parameters
-    ----------
-    cost
-        As of :func:`drive_times`.
-    places
-        ``(K, 2)`` rows and columns.
-    near
-        The ways are followed back to the first block that is so near, s.
-
-    Returns
-    -------
-    blocks
-        ``(K, 2)`` rows and columns; the place itself where it is that near or has no way.
-    """
-    rows, cols = cost.shape
-    blocks = places.copy()
-    for k in range(places.shape[0]):
-        r, c = places[k, 0], places[k, 1]
-        if not np.isfinite(cost[r, c]):
-            continue
-        while cost[r, c] > near:
-            best, y, x = cost[r, c], r, c
-            for dr in range(-1, 2):
-                for dc in range(-1, 2):
-                    a, b = r + dr, c + dc
-                    if 0 <= a < rows and 0 <= b < cols and cost[a, b] < best:
-                        best, y, x = cost[a, b], a, b
-            if y == r and x == c:
-                break
-            r, c = y, x
-        blocks[k, 0], blocks[k, 1] = r, c
-    return blocks
 
 
 @kernel
@@ -244,14 +177,75 @@ def view_gain(blocks: Grid, x: float, y: float, reach: float, mean_free: float, 
 
 
 @kernel
-def way_is_free(clear: FloatArray, way: FloatArray, contact: float) -> bool:
-    """Tell whether nothing known blocks a way, ``(n, 2)`` of (column, row) in blocks, sampled every half block."""
-    rows, cols = clear.shape
-    for n in range(1, way.shape[0]):
-        dx, dy = way[n, 0] - way[n - 1, 0], way[n, 1] - way[n - 1, 1]
-        pieces = int(2.0 * np.hypot(dx, dy)) + 1
-        for p in range(1, pieces + 1):
-            c, r = int(way[n - 1, 0] + dx * p / pieces), int(way[n - 1, 1] + dy * p / pieces)
-            if 0 <= r < rows and 0 <= c < cols and clear[r, c] < contact:
-                return False
-    return True
+def cut(
+    blocks: IntArray,
+    begin: IntArray,
+    border: IntArray,
+    shortest_m: float,
+    widest_m: float,
+    block_m: float,
+    coarse_m: float,
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Cut pieces of the frontier that are too wide in two across their longer side, until none is.
+
+    Parameters
+    ----------
+    blocks, begin
+        ``(n, 2)`` rows and columns of coarse blocks, piece after piece, and where each begins, with the end of the
+        last; the blocks are put in the order of the pieces returned, those of pieces left out among them.
+    border
+        ``(rows, cols)`` number of frontier blocks in each coarse block.
+    shortest_m, widest_m
+        Pieces with a shorter border are left out; the largest extent of a piece, m.
+    block_m, coarse_m
+        Sides of a block and of a coarse one, m.
+
+    Returns
+    -------
+    first, last, middle, length
+        Per piece where its blocks begin and end in ``blocks``, which of them is nearest to their mean, and how many
+        frontier blocks it has.
+    """
+    size = blocks.shape[0]
+    first, last = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
+    middle, length = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
+    ends, apart = np.empty(size + 1, dtype=np.int64), np.empty((size, 2), dtype=np.int64)
+    count = 0
+    for piece in range(begin.shape[0] - 1):
+        low, waiting = begin[piece], 1
+        ends[0] = begin[piece + 1]  # of the pieces still to be looked at, the next one last
+        while waiting > 0:
+            high = ends[waiting - 1]
+            total, sum_row, sum_col = 0, 0, 0
+            r0, r1, c0, c1 = blocks[low, 0], blocks[low, 0], blocks[low, 1], blocks[low, 1]
+            for n in range(low, high):
+                r, c = blocks[n, 0], blocks[n, 1]
+                total, sum_row, sum_col = total + border[r, c], sum_row + r, sum_col + c
+                r0, r1, c0, c1 = min(r0, r), max(r1, r), min(c0, c), max(c1, c)
+            axis = 0 if r1 - r0 >= c1 - c0 else 1
+            extent = max(r1 - r0, c1 - c0)
+            if total * block_m >= shortest_m and extent * coarse_m > widest_m:
+                edge = (r0 if axis == 0 else c0) + extent // 2
+                kept, moved = low, 0
+                for n in range(low, high):
+                    if blocks[n, axis] <= edge:
+                        blocks[kept] = blocks[n]
+                        kept += 1
+                    else:
+                        apart[moved] = blocks[n]
+                        moved += 1
+                blocks[kept:high] = apart[:moved]
+                ends[waiting] = kept
+                waiting += 1
+                continue
+            if total * block_m >= shortest_m:
+                best, at = np.inf, low
+                for n in range(low, high):
+                    dr, dc = blocks[n, 0] - sum_row / (high - low), blocks[n, 1] - sum_col / (high - low)
+                    if dr * dr + dc * dc < best:
+                        best, at = dr * dr + dc * dc, n
+                first[count], last[count], middle[count], length[count] = low, high, at, total
+                count += 1
+            low = high
+            waiting -= 1
+    return first[:count], last[:count], middle[:count], length[:count]

@@ -9,9 +9,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from react_opt.geometry.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
-from react_opt.orchestrator.regions import seen_from
 from react_opt.orchestrator.survey import COARSE, Survey
-from react_opt.orchestrator.survey_kernels import drive_times, ways_out
+from react_opt.orchestrator.survey_drives import drive_times, rimmed, ways_out
+from react_opt.orchestrator.views import count_seen
 
 from .drawn import PROFILE
 
@@ -41,7 +41,16 @@ def test_drive_times_are_those_of_plain_dijkstra(seed: int) -> None:
     i, j, w = np.array(edges).T
     graph = coo_array((w, (i.astype(int), j.astype(int))), shape=(rows * cols, rows * cols)).tocsr()
     expected = dijkstra(graph, indices=3 * cols + 4).reshape(rows, cols)
-    np.testing.assert_allclose(drive_times(passable, slowness, 3, 4), expected, rtol=1e-12)
+    np.testing.assert_allclose(drive_times(rimmed(passable, slowness), np.array([[3, 4]])), expected, rtol=1e-12)
+
+
+def test_times_from_several_points_are_those_from_the_nearest() -> None:
+    cells = np.full((60, 60), FREE, dtype=np.uint8)
+    cells[28:32, 5:] = OCCUPIED
+    survey, points = survey_of(cells), [(1.0, 1.0), (5.0, 5.0), (4.0, 1.5)]
+    each = [survey.times_from(*point, optimistic=False) for point in points]
+    np.testing.assert_array_equal(survey.times_from_nearest(points, optimistic=False), np.min(each, axis=0))
+    assert np.isinf(survey.times_from_nearest([], optimistic=True)).all()
 
 
 def test_updates_give_what_a_new_survey_of_the_last_map_gives() -> None:
@@ -79,9 +88,9 @@ def test_long_frontiers_are_cut() -> None:
 def test_what_stands_behind_a_wall_is_not_seen() -> None:
     blocks = np.zeros((20, 20), dtype=np.uint8)
     blocks[:15, 10] = OCCUPIED  # a wall with an opening above
-    places = np.array([[2, 2], [9, 2]])  # coarse blocks: below, and level with the opening
-    targets = np.array([[2, 8], [9, 8]])
-    assert seen_from(blocks, places, targets, COARSE, 40.0).tolist() == [0, 1]
+    targets = np.array([[2, 8], [9, 8]])  # coarse blocks: below, and level with the opening
+    assert count_seen(blocks, 2, 2, targets, COARSE, 40.0, 0.0) == 0
+    assert count_seen(blocks, 9, 2, targets, COARSE, 40.0, 0.0) == 1
 
 
 def test_a_gap_narrower_than_the_robot_is_no_way() -> None:
@@ -98,7 +107,7 @@ def test_the_way_out_leads_around_a_wall_and_a_near_place_is_its_own() -> None:
     """From (4, 1) the place (4, 5) lies behind a wall that is open at the lower end alone: one sets out downwards."""
     passable = np.ones((7, 7), dtype=bool)
     passable[1:, 3] = False
-    cost = drive_times(passable, np.ones(passable.shape), 4, 1)
+    cost = drive_times(rimmed(passable, np.ones(passable.shape)), np.array([[4, 1]]))
     places = np.array([[4, 5], [4, 2], [6, 3]])
     out = ways_out(cost, places, 2.0)
     assert out[0].tolist() == [2, 1] or out[0].tolist() == [2, 2]

@@ -1,0 +1,168 @@
+"""Compiled parts of :mod:`react_opt.orchestrator.survey` that are about driving over its blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from react_opt.kernels import kernel
+
+Flags = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@kernel
+def nearest_passable(passable: Flags, row: int, col: int, reach: int) -> tuple[int, int]:
+    """Return the passable block nearest to one, within a number of rows and columns, (-1, -1) for none."""
+    best, r_best, c_best = np.inf, -1, -1
+    for r in range(max(0, row - reach), min(passable.shape[0], row + reach + 1)):
+        for c in range(max(0, col - reach), min(passable.shape[1], col + reach + 1)):
+            gap = (r - row) ** 2 + (c - col) ** 2
+            if gap < best and passable[r, c]:
+                best, r_best, c_best = gap, r, c
+    return r_best, c_best
+
+
+@kernel
+def rimmed(passable: Flags, slowness: FloatArray) -> FloatArray:
+    """Return slowness with a rim of one block around, 0 in the rim and where nothing can pass."""
+    rows, cols = passable.shape
+    out = np.zeros((rows + 2, cols + 2))
+    for r in range(rows):
+        for c in range(cols):
+            if passable[r, c]:
+                out[r + 1, c + 1] = slowness[r, c]
+    return out
+
+
+@kernel
+def drive_times(slow: FloatArray, starts: IntArray) -> FloatArray:
+    """Return s to every block from the start that is nearest, over eight neighbours, infinite where there is no way.
+
+    Dijkstra's search with a ring of buckets as wide as the cheapest crossing: no order within a bucket matters. A
+    diagonal step needs one of the two blocks beside it.
+
+    Parameters
+    ----------
+    slow
+        What crossing a block costs, s, as of :func:`rimmed`.
+    starts
+        ``(n, 2)`` rows and columns, without the rim.
+    """
+    cols, size = slow.shape[1], slow.size
+    cross = slow.reshape(-1)
+    least, most = np.inf, 0.0
+    for at in range(size):
+        if cross[at] > 0:
+            least, most = min(least, cross[at]), max(most, cross[at])
+    cost = np.full(size, np.inf)
+    done = np.zeros(size, dtype=np.bool_)
+    mask = 1
+    while mask < int(1.5 * most / least) + 3:
+        mask = 2 * mask + 1
+    head = np.full(mask + 1, -1, dtype=np.int32)  # of lists of waiting blocks, linked both ways
+    after, ahead = np.empty(size, dtype=np.int32), np.empty(size, dtype=np.int32)
+    waiting, turn = 0, 0
+    for n in range(starts.shape[0]):
+        at = (starts[n, 0] + 1) * cols + starts[n, 1] + 1
+        if cross[at] > 0 and cost[at] > 0:
+            cost[at], after[at], ahead[at] = 0.0, head[0], -1
+            if head[0] >= 0:
+                ahead[head[0]] = at
+            head[0] = at
+            waiting += 1
+    while waiting > 0:
+        here = head[turn & mask]
+        if here < 0:
+            turn += 1
+            continue
+        low = after[here]
+        head[turn & mask] = low
+        if low >= 0:
+            ahead[low] = -1
+        waiting -= 1
+        done[here] = True
+        left, right = cross[here - 1] > 0, cross[here + 1] > 0
+        for dr in range(-1, 2):
+            middle = here + dr * cols
+            straight = cross[middle] > 0
+            for dc in range(-1, 2):
+                there = middle + dc
+                if cross[there] <= 0 or (dr != 0 and dc != 0 and not (straight or (left if dc < 0 else right))):
+                    continue
+                step = 0.7071067811865476 if dr != 0 and dc != 0 else 0.5
+                reached = cost[here] + step * (cross[here] + cross[there])
+                known = cost[there]
+                if reached >= known or done[there]:
+                    continue
+                if known < np.inf:
+                    low, high = after[there], ahead[there]
+                    if high >= 0:
+                        after[high] = low
+                    else:
+                        head[int(known / least) & mask] = low
+                    if low >= 0:
+                        ahead[low] = high
+                else:
+                    waiting += 1
+                cost[there] = reached
+                slot = int(reached / least) & mask
+                low = head[slot]
+                after[there], ahead[there] = low, -1
+                if low >= 0:
+                    ahead[low] = there
+                head[slot] = there
+    return cost.reshape(slow.shape)[1:-1, 1:-1].copy()
+
+
+@kernel
+def ways_out(cost: FloatArray, places: NDArray[np.int64], near: float) -> NDArray[np.int64]:
+    """Return by which block the quickest way to each of some places leaves the block that a field starts from.
+
+    Parameters
+    ----------
+    cost
+        As of :func:`drive_times`.
+    places
+        ``(K, 2)`` rows and columns.
+    near
+        The ways are followed back to the first block that is so near, s.
+
+    Returns
+    -------
+    blocks
+        ``(K, 2)`` rows and columns; the place itself where it is that near or has no way.
+    """
+    rows, cols = cost.shape
+    blocks = places.copy()
+    for k in range(places.shape[0]):
+        r, c = places[k, 0], places[k, 1]
+        if not np.isfinite(cost[r, c]):
+            continue
+        while cost[r, c] > near:
+            best, y, x = cost[r, c], r, c
+            for dr in range(-1, 2):
+                for dc in range(-1, 2):
+                    a, b = r + dr, c + dc
+                    if 0 <= a < rows and 0 <= b < cols and cost[a, b] < best:
+                        best, y, x = cost[a, b], a, b
+            if y == r and x == c:
+                break
+            r, c = y, x
+        blocks[k, 0], blocks[k, 1] = r, c
+    return blocks
+
+
+@kernel
+def way_is_free(clear: FloatArray, way: FloatArray, contact: float) -> bool:
+    """Tell whether nothing known blocks a way, ``(n, 2)`` of (column, row) in blocks, sampled every half block."""
+    rows, cols = clear.shape
+    for n in range(1, way.shape[0]):
+        dx, dy = way[n, 0] - way[n - 1, 0], way[n, 1] - way[n - 1, 1]
+        pieces = int(2.0 * np.hypot(dx, dy)) + 1
+        for p in range(1, pieces + 1):
+            c, r = int(way[n - 1, 0] + dx * p / pieces), int(way[n - 1, 1] + dy * p / pieces)
+            if 0 <= r < rows and 0 <= c < cols and clear[r, c] < contact:
+                return False
+    return True
