@@ -18,7 +18,7 @@ from react_opt.geometry.occupancy import FREE, OCCUPIED, OccupancyMap
 from react_opt.geometry.raycast import ray_table, rays_px, unknown_ahead_px
 from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget, RobotView
 from react_opt.orchestrator.belief_areas import Areas
-from react_opt.orchestrator.belief_avoid import SLOWER, first_clear, without_discs
+from react_opt.orchestrator.belief_avoid import SLOWER, first_clear, with_gaps, without_discs
 from react_opt.orchestrator.belief_map import ROOM_M, BeliefMap, clear_at
 from react_opt.orchestrator.belief_paths import Field, Slowness, nearest_block, nearest_blocks, slowness
 from react_opt.orchestrator.belief_regions import flood
@@ -76,6 +76,7 @@ class FleetBelief:
         self._map = BeliefMap(frame, window, radii, cap, prior)
         self._areas = Areas(self._map, low, high, cell_m, range_m)
         self._robots: dict[str, RobotView] = {}
+        self._home: dict[str, tuple[float, float]] = {}
         self._reported = 0
         self._fresh = (-1, -1)
         self._slow: dict[tuple[int, bool], Slowness] = {}
@@ -132,6 +133,7 @@ class FleetBelief:
     def report(self, robot: RobotView) -> None:
         """Take note of a robot's state; the first report of a robot makes it known."""
         self._robots[robot.id] = robot
+        self._home.setdefault(robot.id, (robot.x_m, robot.y_m))  # where it came from it gets back to
         self._reported += 1
         self.t_s = max(self.t_s, robot.heard_s)
 
@@ -195,12 +197,22 @@ class FleetBelief:
     def path(
         self, robot: RobotView, goal_m: tuple[float, float], *, optimistic: bool = False
     ) -> tuple[tuple[float, float], ...]:
-        """Return way points to the goal, the robot's place first; empty where there is no way."""
+        """Return way points to the goal, the robot's place first; empty where there is no way.
+
+        A robot that cannot even get back to where it came from has passed a gap narrower than its disc, and may again.
+        """
         slow = self._slowness(robot.profile, optimistic)
         (goal,) = self._blocks(slow, [goal_m])
         if goal < 0:
             return ()
-        return self._way(self._field_from([robot], optimistic), int(goal), robot)
+        field = self._field_from([robot], optimistic)
+        home = self._start(robot.profile, self._home.get(robot.id, (robot.x_m, robot.y_m)), optimistic)
+        way = self._way(field, int(goal), robot)
+        if way or np.isfinite(field.times_s([home])[0]):
+            return way
+        tight = with_gaps(slow, self._map.clear, self._map.known > 0, robot.profile, self._map.frame.resolution_m)
+        tight = without_discs(tight, self._discs(self._bodies(robot.profile)), 0.0)
+        return self._way(self._search(tight, robot), int(goal), robot)
 
     def table(self, profile: RobotProfile, points_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return time (s) and energy (J) between ``(n, 2)`` points over known-free space as ``(n, n)``, NaN: no way."""
@@ -289,12 +301,12 @@ class FleetBelief:
         self._fresh = (self._map.version, self._reported)
         self._areas.fit()
         alive = [robot for robot in self._robots.values() if robot.state != "dead"]
-        reached = [flood(self._map.passable(0, unknown), self._starts(alive, unknown)) for unknown in (False, True)]
+        places = [(robot.profile, place) for robot in alive for place in ((robot.x_m, robot.y_m), self._home[robot.id])]
+        reached = [flood(self._map.passable(0, unknown), self._starts(places, unknown)) for unknown in (False, True)]
         self._areas.refresh(reached[0], reached[1])
 
-    def _starts(self, robots: Sequence[RobotView], optimistic: bool) -> IntArray:
-        starts = [self._start(robot.profile, (robot.x_m, robot.y_m), optimistic) for robot in robots]
-        return np.array(starts, dtype=np.int64)
+    def _starts(self, places: Sequence[tuple[RobotProfile, tuple[float, float]]], optimistic: bool) -> IntArray:
+        return np.array([self._start(profile, place, optimistic) for profile, place in places], dtype=np.int64)
 
     def _start(self, profile: RobotProfile, point_m: tuple[float, float], optimistic: bool) -> int:
         """Return the block that a robot drives from: the nearest where it may stand, else its own."""

@@ -35,6 +35,8 @@ BLOCK_M = 0.1
 COARSE = 2
 HIDDEN_SLOWER = 1.15
 """Ways through hidden space are rarely straight: their time is taken to be so much longer."""
+NEAR_BLOCKS, CLOSED_IN_BLOCKS = 10, 50
+"""A drive starts from the nearest coarse block within the first reach; if none leads anywhere, within the second."""
 SLACK_M = 0.1
 """A way counts as blocked where something known comes so much nearer than contact: blocks are not exact."""
 
@@ -96,7 +98,7 @@ class Survey:
         self.known, self.may, clear_px, self.border, self.hidden, self.best = coarse_blocks(
             self.blocks, self._clear_px, self.radius_m / res - 1e-6, COARSE
         )
-        parts, _ = ndimage.label(self.may, structure=np.ones((3, 3)))
+        parts, _ = ndimage.label(self.may)  # through sides: drives do not squeeze through corners
         sizes = np.bincount(parts.ravel())
         sizes[0] = 0
         self.main = parts == np.argmax(sizes) if sizes.any() else self.may  # apart from islands among obstacles
@@ -143,12 +145,16 @@ class Survey:
 
     def times_from_nearest(self, points_m: Sequence[tuple[float, float]], *, optimistic: bool) -> FloatArray:
         """Return ``(rows, cols)`` s to every coarse block from the point from where it takes least."""
-        start_in = self.main if optimistic else self.known
-        blocks = [self.nearest_block(self.block_of(*point), start_in, 10) for point in points_m]
+        blocks = [self._start(self.block_of(*point), optimistic) for point in points_m]
         starts = np.array([block for block in blocks if block is not None], dtype=np.int64).reshape(-1, 2)
         if optimistic not in self._slow:
             self._slow[optimistic] = rimmed(self.may if optimistic else self.known, self.slowness)
         return np.asarray(drive_times(self._slow[optimistic], starts))
+
+    def _start(self, block: Block, optimistic: bool) -> Block | None:
+        """Return the coarse block that a drive starts from, further away where a robot is closed in."""
+        start = self.nearest_block(block, self.main if optimistic else self.known, NEAR_BLOCKS)
+        return self.nearest_block(block, self.main, CLOSED_IN_BLOCKS) if start is None and optimistic else start
 
     def is_free(self, way_m: ArrayLike) -> bool:
         """Tell whether nothing known blocks a way of ``(n, 2)`` points, m."""

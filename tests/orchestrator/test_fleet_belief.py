@@ -289,3 +289,35 @@ def test_a_dead_robot_stands_in_the_way() -> None:
         belief.report(dataclasses.replace(robot_at(10.0, 5.0, "r2"), state="dead"))
         assert np.isfinite(belief.costs(belief.robots[0], goal)[0][0]) == (not blocks)
         assert (belief.path(belief.robots[0], (18.0, 5.0), optimistic=True) == ()) == blocks
+
+
+def halved(gap: int) -> OccupancyMap:
+    """Return the hall with a wall across, at x = 10 m, and a gap of so many pixels in its middle."""
+    cells = truth_of().cells.copy()
+    cells[:, 100] = OCCUPIED
+    cells[50 - gap // 2 : 50 + gap // 2, 100] = FREE
+    return OccupancyMap(cells, 0.1)
+
+
+def test_a_robot_leaves_through_the_gap_that_it_came_in_by_and_no_other_one_enters() -> None:
+    """A wall with a gap of 0.6 m: too narrow for the robot's disc (0.67 m), not for the robot (0.43 m)."""
+    truth = halved(6)
+    belief = belief_of(truth)
+    belief.report(robot_at(5.0, 5.0))
+    shown(belief, truth, 0, 200)
+    assert belief.path(robot_at(5.0, 5.0), (15.0, 5.0)) == ()
+    belief.report(robot_at(15.0, 5.0))  # it has slipped through before it knew how narrow the gap was
+    back = belief.path(robot_at(15.0, 5.0), (5.0, 5.0))
+    assert back[-1] == pytest.approx((5.0, 5.0), abs=0.1)
+    assert all(abs(y - 5.0) < 0.2 for x, y in back if abs(x - 10.05) < 0.3)
+    shown(belief, halved(0), 0, 200)
+    assert belief.path(robot_at(15.0, 5.0), (5.0, 5.0)) == ()
+
+
+def test_where_a_robot_came_from_is_not_out_of_reach() -> None:
+    truth = halved(0)
+    belief = belief_of(truth)
+    belief.report(robot_at(5.0, 5.0))
+    belief.report(robot_at(15.0, 5.0))
+    shown(belief, truth, 20, 200)
+    assert [area.unreachable for area in belief.areas] == [False, False]

@@ -113,3 +113,12 @@ def test_the_way_out_leads_around_a_wall_and_a_near_place_is_its_own() -> None:
     assert out[0].tolist() == [2, 1] or out[0].tolist() == [2, 2]
     assert out[1].tolist() == [4, 2]
     assert out[2].tolist() == [6, 3], "there is no way there"
+
+
+def test_a_robot_that_is_closed_in_starts_from_the_nearest_place_that_leads_on() -> None:
+    """A cell of 2 m walled off in a hall of 20 m: the hall is most of what can be driven over."""
+    cells = np.zeros((100, 200), dtype=np.uint8)
+    cells[[0, -1]] = cells[:, [0, -1]] = OCCUPIED
+    cells[:31, 30], cells[30, :31] = OCCUPIED, OCCUPIED
+    times = survey_of(cells).times_from(1.0, 1.0, optimistic=True)
+    assert np.isfinite(times[40, 50])
