@@ -6,7 +6,9 @@ inspection) can use them with a pricer of their own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any, Protocol
 
 import numpy as np
@@ -72,8 +74,8 @@ class Rank1Cut(Protocol):
         """Right-hand side of ``sum coefficient * use <= rhs``."""
         ...
 
-    def coefficient(self, column: Column) -> float:
-        """Return the cut's coefficient in a column."""
+    def coefficients(self, columns: Sequence[Column], counts: FloatArray) -> FloatArray:
+        """Return the cut's coefficient in each column; ``counts`` is ``(m, n_cells)`` how often it collects a cell."""
         ...
 
 
@@ -103,3 +105,20 @@ def counted(cells: tuple[int, ...]) -> tuple[IntArray, FloatArray]:
     """Return the distinct cells of a column and how often each is collected."""
     distinct, times = np.unique(np.array(cells, dtype=np.int64), return_counts=True)
     return distinct, times.astype(np.float64)
+
+
+def coefficients(rows: Sequence[Rank1Cut], columns: Sequence[Column], n_cells: int) -> FloatArray:
+    """Return ``(len(rows), len(columns))`` the coefficients of cuts and side rows.
+
+    Parameters
+    ----------
+    rows, columns, n_cells
+        The rows, the columns and the number of cells.
+    """
+    counts = np.zeros((len(columns), n_cells))
+    owner = np.repeat(np.arange(len(columns)), [len(column.cells) for column in columns])
+    np.add.at(counts, (owner, np.fromiter(chain.from_iterable(column.cells for column in columns), np.int64)), 1.0)
+    found = np.zeros((len(rows), len(columns)))
+    for k, row in enumerate(rows):
+        found[k] = row.coefficients(columns, counts)
+    return found

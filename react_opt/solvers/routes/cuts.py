@@ -37,10 +37,15 @@ class SubsetRow:
 
     rhs: float = 1.0
 
+    def coefficients(self, columns: Sequence[Column], counts: FloatArray) -> FloatArray:
+        """Return how often each column's route collects two of the cells without forgetting in between."""
+        found = np.zeros(len(columns))
+        for k in np.flatnonzero(counts[:, list(self.cells)].sum(axis=1) >= 2.0).tolist():
+            found[k] = self.coefficient(columns[k])
+        return found
+
     def coefficient(self, column: Column) -> float:
-        """Return how often the column's route collects two of the cells without forgetting in between."""
-        if sum(map(column.cells.count, self.cells)) < 2:
-            return 0.0
+        """Return the same for one column."""
         route = column.path
         odd, times = False, 0
         for cell, senses in zip(route.cell.tolist(), route.sense.tolist(), strict=True):

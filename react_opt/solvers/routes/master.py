@@ -19,8 +19,10 @@ import highspy
 import numpy as np
 
 from react_opt.route_problem import FloatArray, IntArray
-from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut, counted
+from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut, coefficients, counted
 from react_opt.solvers.routes.region import Region
+
+DUAL_SIMPLEX, PRIMAL_SIMPLEX = 1, 4  # as HiGHS numbers them
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,7 @@ class Master:
         self._side_rows: list[int] = []
         self._penalty = penalty
         self._threads = threads
+        self._new_rows = True
         self._extra = len(self.counts) + n_cells  # artificial columns
         self.region: Region | None = None
         self._start()
@@ -115,7 +118,9 @@ class Master:
                 fresh.append(column)
         if not fresh:
             return 0
-        entries = [self._entries(column) for column in fresh]
+        extra = coefficients(self.cuts + self.rows, fresh, self.n_cells)
+        extra_rows = np.array(self._cut_rows + self._side_rows, dtype=np.int64)
+        entries = [self._entries(column, extra_rows, extra[:, k]) for k, column in enumerate(fresh)]
         index, value = [rows for rows, _ in entries], [times for _, times in entries]
         starts = np.cumsum([0] + [len(rows) for rows in index[:-1]])
         indices = np.concatenate(index).astype(np.int32)
@@ -132,17 +137,13 @@ class Master:
         self.columns += fresh
         return len(fresh)
 
-    def _entries(self, column: Column) -> tuple[IntArray, FloatArray]:
-        """Return the rows of a column and its coefficients there."""
+    def _entries(self, column: Column, extra_rows: IntArray, extra: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the rows of a column and its coefficients there; ``extra`` are those in cuts and side rows."""
         rows, times = counted(column.cells)
-        extra = [
-            (row, row_cut.coefficient(column))
-            for row, row_cut in zip(self._cut_rows + self._side_rows, self.cuts + self.rows, strict=True)
-        ]
-        extra = [(row, coefficient) for row, coefficient in extra if coefficient]
+        in_extra = np.flatnonzero(extra)
         return (
-            np.concatenate((rows, [self.n_cells + column.group], [row for row, _ in extra])).astype(np.int64),
-            np.concatenate((times, [1.0], [coefficient for _, coefficient in extra])),
+            np.concatenate((rows, [self.n_cells + column.group], extra_rows[in_extra])),
+            np.concatenate((times, [1.0], extra[in_extra])),
         )
 
     def drop(self, unwanted: Callable[[Column], bool]) -> None:
@@ -184,6 +185,7 @@ class Master:
         index = np.concatenate((np.arange(n), np.arange(len(self.columns)) + self._extra)).astype(np.int32)
         upper = np.concatenate((np.where(region.must, inf, 0.0), self._most(self.columns)))
         self._lp.changeColsBounds(len(index), index, np.zeros(len(index)), upper)
+        self._new_rows = True
         for cell in range(n):
             self._lp.changeRowBounds(cell, 1.0 if region.must[cell] else -inf, 1.0)
 
@@ -208,23 +210,23 @@ class Master:
 
     def add_cuts(self, cuts: Sequence[Rank1Cut]) -> None:
         """Add cuts (priced through ``Duals.cut``)."""
-        for cut in cuts:
-            self._cut_rows.append(self._add_row(cut))
-            self.cuts.append(cut)
+        self._cut_rows += self._add_to_model(cuts)
+        self.cuts += cuts
 
     def add_rows(self, rows: Sequence[Rank1Cut]) -> None:
         """Add side rows (priced through ``Duals.row``)."""
-        for row in rows:
-            self._side_rows.append(self._add_row(row))
-            self.rows.append(row)
+        self._side_rows += self._add_to_model(rows)
+        self.rows += rows
 
-    def _add_row(self, row: Rank1Cut) -> int:
-        pairs = [(k + self._extra, row.coefficient(column)) for k, column in enumerate(self.columns)]
-        pairs = [(k, coefficient) for k, coefficient in pairs if coefficient]
-        index = np.array([k for k, _ in pairs], dtype=np.int32)
-        values = np.array([coefficient for _, coefficient in pairs])
-        self._lp.addRow(-highspy.kHighsInf, row.rhs, len(index), index, values)
-        return int(self._lp.getNumRow()) - 1
+    def _add_to_model(self, rows: Sequence[Rank1Cut]) -> list[int]:
+        """Add rows to the model; return which they are there."""
+        first = int(self._lp.getNumRow())
+        self._new_rows |= len(rows) > 0
+        for row, inside in zip(rows, coefficients(rows, self.columns, self.n_cells), strict=True):
+            index = np.flatnonzero(inside)
+            place = (index + self._extra).astype(np.int32)
+            self._lp.addRow(-highspy.kHighsInf, row.rhs, len(index), place, inside[index])
+        return list(range(first, first + len(rows)))
 
     def solve(self, time_limit_s: float | None = None) -> MasterPoint | None:
         """Return the optimum of the linear programme; None if the time did not suffice.
@@ -236,6 +238,9 @@ class Master:
         """
         if time_limit_s is not None:
             self._lp.setOptionValue("time_limit", float(self._lp.getRunTime()) + max(0.01, time_limit_s))
+        # new columns leave the last basis primal feasible, new rows dual feasible
+        self._lp.setOptionValue("simplex_strategy", DUAL_SIMPLEX if self._new_rows else PRIMAL_SIMPLEX)
+        self._new_rows = False
         self._lp.run()
         if self._lp.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             self._lp.clearSolver()
@@ -263,13 +268,10 @@ class Master:
         for k, column in enumerate(self.columns):
             rows, times = counted(column.cells)
             reduced[k] = column.value - duals.group[column.group] - float(times @ duals.cell[rows])
-        for cut, price in zip(self.cuts, duals.cut, strict=True):
-            if price > 0:
-                reduced -= price * np.array([cut.coefficient(column) for column in self.columns])
-        for row, price in zip(self.rows, duals.row, strict=True):
-            if price > 0:
-                reduced -= price * np.array([row.coefficient(column) for column in self.columns])
-        return reduced
+        price = np.concatenate((duals.cut, duals.row))
+        paid = np.flatnonzero(price > 0.0)
+        rows_paid = [(self.cuts + self.rows)[k] for k in paid.tolist()]
+        return reduced - price[paid] @ coefficients(rows_paid, self.columns, self.n_cells)
 
 
 def _key(column: Column) -> tuple[int, bytes, bytes]:

@@ -35,7 +35,11 @@ class StandRow:
     rhs: float
     sign: int = 1
 
-    def coefficient(self, column: Column) -> float:
+    def coefficients(self, columns: Sequence[Column], counts: FloatArray) -> FloatArray:
+        """Return the row's coefficient in each column, see `Rank1Cut`."""
+        return np.array([self._coefficient(column) for column in columns], dtype=np.float64)
+
+    def _coefficient(self, column: Column) -> float:
         """Return 1 (times the sign) if the column's route stands there then."""
         cells = column.path.cell
         position = len(cells) - 1 - self.from_end
@@ -49,7 +53,11 @@ class SenseRow:
     from_end: int
     rhs: float
 
-    def coefficient(self, column: Column) -> float:
+    def coefficients(self, columns: Sequence[Column], counts: FloatArray) -> FloatArray:
+        """Return the row's coefficient in each column, see `Rank1Cut`."""
+        return np.array([self._coefficient(column) for column in columns], dtype=np.float64)
+
+    def _coefficient(self, column: Column) -> float:
         """Return 1 if the column's route senses then."""
         senses = column.path.sense
         position = len(senses) - 1 - self.from_end
@@ -64,7 +72,11 @@ class ChargeRow:
     from_end: int
     rhs: float
 
-    def coefficient(self, column: Column) -> float:
+    def coefficients(self, columns: Sequence[Column], counts: FloatArray) -> FloatArray:
+        """Return the row's coefficient in each column, see `Rank1Cut`."""
+        return np.array([self._coefficient(column) for column in columns], dtype=np.float64)
+
+    def _coefficient(self, column: Column) -> float:
         """Return 1 if the column's route charges there then."""
         path = column.path
         position = len(path.cell) - 1 - self.from_end

@@ -8,6 +8,7 @@ memory and cost a look at the routes only.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -57,14 +58,9 @@ class SetCut:
         """Right-hand side."""
         return float(sum(self.times) // self.over)
 
-    def coefficient(self, column: Column) -> float:
-        """Return the cut's coefficient in a column that collects no cell twice."""
-        held = column.cells
-        return float(sum([t for cell, t in zip(self.cells, self.times, strict=True) if cell in held]) // self.over)
-
-    def coefficients(self, inside: Bits) -> IntArray:
-        """Return its coefficient for each row of ``(m, n_cells)`` 0 or 1: the cells that a route collects."""
-        total = inside[:, list(self.cells)].astype(np.int64) @ np.array(self.times, dtype=np.int64)
+    def coefficients(self, columns: Sequence[Column], counts: FloatArray) -> FloatArray:
+        """Return its coefficient in each column that collects no cell twice, see `Rank1Cut`."""
+        total: FloatArray = counts[:, list(self.cells)] @ np.array(self.times, dtype=np.float64)
         return total // self.over
 
 
