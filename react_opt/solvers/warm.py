@@ -24,6 +24,8 @@ from react_opt.solvers.routes.enumeration import enumerate_routes
 from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pricing import RoutePricer
 from react_opt.solvers.routes.setcuts import separate_sets
+from react_opt.solvers.routes.setjoin import best_of_each
+from react_opt.solvers.routes.setprices import set_prices
 from react_opt.solvers.routes.smoothing import SmoothedDual
 from react_opt.timegraph import route_problem
 
@@ -73,7 +75,9 @@ def _enumerate(instance: OrosInstance) -> None:
     duals = Duals(np.zeros(problem.n_cells), np.zeros(len(problem.classes)), none, none)
     found = enumerate_routes(pricer, 0, duals, 0.0)
     assert found is not None
-    pool = Pool(found.value, np.zeros(len(found.value)), np.zeros(len(found.value), np.int64), found.sets)
+    look = found.look(set_prices(duals.cell, (), none), 0.0, 1000)
+    best_of_each(look.sets, look.value)  # where there are threads
+    pool = Pool(look.value, np.zeros(len(look.value)), np.zeros(len(look.value), np.int64), look.sets)
     separate_sets(np.eye(6, dtype=np.uint8), np.ones(6), set(), 1)
     best_choice(pool, np.ones(1, np.int64), np.zeros(problem.n_cells), 1.0, 0.0, 1, pricer.stop)
 

@@ -13,13 +13,16 @@ from react_opt.solvers.routes.budget import Standing
 from react_opt.solvers.routes.choice import Pool, best_choice
 from react_opt.solvers.routes.columns import Duals, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
-from react_opt.solvers.routes.enumeration import Enumerated, enumerate_routes
+from react_opt.solvers.routes.enumeration import Enumeration, enumerate_routes
 from react_opt.solvers.routes.generation import Generation, Multipliers
-from react_opt.solvers.routes.pool import CUTS_AT_ONCE, TINY, PoolPrices, PoolProgram
+from react_opt.solvers.routes.pool import CUTS_AT_ONCE, TINY, WORTH_IT, PoolPrices, PoolProgram
 from react_opt.solvers.routes.setcuts import SetCut, separate_sets
+from react_opt.solvers.routes.setprices import set_prices
 
 EASIER = 0.85  # share of the last hopeless gap at which it is tried again
-LEAST, MOST = 400_000, 3_000_000  # labels of each direction, and routes; in between as many as labels priced so far
+LEAST, MOST = 400_000, 6_000_000  # labels of each direction; in between twice as many as labels priced so far
+MOST_ROUTES = 200_000  # in the linear programme
+PATIENCE = 5  # looks at all routes that may fail to lower the bound by so much of the gap
 FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choosing among them, at most about a second
 
 
@@ -28,6 +31,14 @@ class Finished(NamedTuple):
 
     bound: float
     stages: tuple[PoolPrices, ...] = ()
+
+
+class _Listed(NamedTuple):
+    """Routes that lose least at some prices, the bound that these prove, and whether no route is missing."""
+
+    pool: Pool
+    prices: PoolPrices
+    whole: bool
 
 
 class Finish:
@@ -73,9 +84,9 @@ class Finish:
         if gap > self._hopeless_gap and not anew:
             return None
         pricer, floor = self.generation.pricer, standing.objective
-        most = min(MOST, max(LEAST, pricer.labels))
+        most = min(MOST, max(LEAST, 2 * pricer.labels))
         duals = self.generation.extended(best)
-        found: list[Enumerated] = []
+        found: list[Enumeration] = []
         for group in range(len(master.counts)):
             routes = enumerate_routes(
                 pricer,
@@ -85,7 +96,6 @@ class Finish:
                 self.generation.side,
                 master.cuts,
                 max_labels=most,
-                max_routes=most - sum(len(one.value) for one in found),
                 threads=self.threads,
             )
             standing.budget.spend()
@@ -96,10 +106,9 @@ class Finish:
         finished, complete = self._choose(found, duals, gap)
         if not complete:
             self._hopeless_gap = self._hopeless_gap if anew else EASIER * gap
-        self.routes += sum(len(one.value) for one in found)
         return finished._replace(bound=max(finished.bound, floor))
 
-    def _choose(self, found: list[Enumerated], duals: Duals, gap: float) -> tuple[Finished, bool]:
+    def _choose(self, found: list[Enumeration], duals: Duals, gap: float) -> tuple[Finished, bool]:
         """Offer the best choice of routes; return the most that a choice is worth and whether that is certain.
 
         Between attempts to choose, a linear programme over the routes enumerated leaves fewer of them.
@@ -107,35 +116,100 @@ class Finish:
         standing, counts = self.standing, np.array(self.generation.master.counts, dtype=np.int64)
         region = self.generation.side.region
         must = np.zeros(len(duals.cell), np.bool_) if region is None else region.must
-        loss = np.concatenate([duals.group[k] - one.reduced for k, one in enumerate(found)])
-        group = np.concatenate([np.full(len(one.value), k, np.int64) for k, one in enumerate(found)])
-        value, sets = np.concatenate([one.value for one in found]), np.concatenate([one.sets for one in found])
-        order = np.argsort(loss, kind="stable")
-        pool, price, program = Pool(value[order], loss[order], group[order], sets[order]), duals.cell, None
-        worth, going = self._best_of(pool, np.where(must, np.inf, np.maximum(price, 0.0)), gap, FIRST_WORK, found)
-        if not going:
-            return Finished(worth), True
-        if not np.array_equal(np.unique(pool.group), np.arange(len(counts))):
+        listed = self._look(found, _set_prices(duals, self.generation.master.cuts), duals.group - gap)
+        if listed is None:
+            return Finished(np.inf), False
+        pool, prices, whole = listed
+        if len(np.unique(pool.group)) < len(counts):
             return Finished(standing.objective or 0.0), True
-        first = _set_prices(duals, self.generation.master.cuts)
-        more_cuts = self._violated(set(first.cuts))
-        first = replace(
-            first, cuts=(*first.cuts, *more_cuts), price=np.concatenate((first.price, np.zeros(len(more_cuts))))
-        )
-        program = PoolProgram(pool, first, counts.tolist(), must, standing, self.threads)
+        if whole:
+            self.routes += len(pool.value)
+            left = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
+            worth, going = self._best_of(pool, left, self._gap(prices), FIRST_WORK, found)
+            if not going:
+                return Finished(worth), True
+        more_cuts = self._violated(set(prices.cuts))
+        cuts, price = (*prices.cuts, *more_cuts), np.concatenate((prices.price, np.zeros(len(more_cuts))))
+        first = replace(prices, cuts=cuts, price=price)
+        program = PoolProgram(pool, first, counts.tolist(), must, standing, self.threads, whole=whole)
+        if not whole:
+            best, whole = self._complete(program, found)
+            if not whole:
+                return Finished(best.bound, (best,)), False
         while True:
             more = program.tighten()
-            prices, floor = program.prices, standing.objective
-            assert floor is not None
-            gap = prices.bound - floor + 1e-7 * max(1.0, abs(prices.bound))
+            prices = program.prices
             if standing.proven(prices.bound):
                 return Finished(prices.bound, tuple(program.stages)), True
             price = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
-            worth, going = self._best_of(program.pool, price, gap, FIRST_WORK if more else MOST_WORK, found)
+            work = FIRST_WORK if more else MOST_WORK
+            worth, going = self._best_of(program.pool, price, self._gap(prices), work, found)
             if not going:
                 return Finished(worth, tuple(program.stages)), True
             if not more:
                 return Finished(prices.bound, tuple(program.stages)), False
+
+    def _complete(self, program: PoolProgram, found: list[Enumeration]) -> tuple[PoolPrices, bool]:
+        """Go on with prices over a part of the routes until no route is missing at these.
+
+        Return the prices of the smallest bound over all routes, and whether it came to that.
+        """
+        best, rounds, failed = program.prices, 1, 0
+        while failed < PATIENCE and not self.standing.budget.over():
+            for _ in range(rounds):
+                if not program.tighten():
+                    break
+            expected = program.prices.bound
+            listed = self._look(found, program.prices, program.prices.group - self._gap(best))
+            if listed is None:
+                break
+            pool, prices, whole = listed
+            # where the part stood for all routes it may do so a little longer
+            rounds = rounds + 1 if prices.bound <= expected + TINY else 1
+            failed = 0 if best.bound - prices.bound > WORTH_IT * self._gap(best) else failed + 1
+            best = min(best, prices, key=lambda one: one.bound)
+            program.renew(pool, prices, whole=whole)
+            if whole:
+                self.routes += len(pool.value)
+                return prices, True
+        return best, False
+
+    def _gap(self, prices: PoolPrices) -> float:
+        """Return what a route can lose at some prices in a plan better than the incumbent."""
+        floor = -np.inf if self.standing.objective is None else self.standing.objective
+        return prices.bound - floor + 1e-7 * max(1.0, abs(prices.bound))
+
+    def _look(self, found: list[Enumeration], prices: PoolPrices, least: FloatArray) -> _Listed | None:
+        """Return the routes that lose least at some prices; None if it was interrupted.
+
+        Parameters
+        ----------
+        found
+            The routes of each class.
+        prices
+            The prices; ``bound`` and ``group`` are of no consequence.
+        least
+            ``(n_classes,)`` value minus prices from which on routes are of interest.
+        """
+        form = set_prices(prices.cell, prices.cuts, prices.price)
+        looks = [
+            one.look(form, float(worth), MOST_ROUTES // len(found)) for one, worth in zip(found, least, strict=True)
+        ]
+        if any(look.whole_above == np.inf for look in looks):
+            return None
+        best = np.array([look.reduced.max(initial=worth) for look, worth in zip(looks, least.tolist(), strict=True)])
+        counts = np.array(self.generation.master.counts, dtype=np.float64)
+        rhs = np.array([cut.rhs for cut in prices.cuts])
+        bound = float(prices.cell.sum()) + float(prices.price @ rhs) + float(counts @ best)
+        prices = replace(prices, bound=bound, group=best)
+        gap = self._gap(prices)
+        whole = all(look.whole_above <= top - gap for look, top in zip(looks, best.tolist(), strict=True))
+        loss = np.concatenate([top - look.reduced for look, top in zip(looks, best.tolist(), strict=True)])
+        group = np.concatenate([np.full(len(look.value), k, np.int64) for k, look in enumerate(looks)])
+        value, sets = np.concatenate([look.value for look in looks]), np.concatenate([look.sets for look in looks])
+        order = np.argsort(loss, kind="stable")
+        order = order[loss[order] <= gap]
+        return _Listed(Pool(value[order], loss[order], group[order], sets[order]), prices, whole)
 
     def _violated(self, known: set[SetCut]) -> list[SetCut]:
         """Return cuts over sets that the last point of column generation violates: the first of the programme."""
@@ -149,7 +223,7 @@ class Finish:
         return separate_sets(inside, point.use[used], known, CUTS_AT_ONCE)
 
     def _best_of(
-        self, pool: Pool, price: FloatArray, gap: float, most_work: int, found: list[Enumerated]
+        self, pool: Pool, price: FloatArray, gap: float, most_work: int, found: list[Enumeration]
     ) -> tuple[float, bool]:
         """Offer the best choice from a pool; return its value and whether there may be a better one."""
         standing, pricer = self.standing, self.generation.pricer
@@ -159,8 +233,7 @@ class Finish:
         standing.budget.spend()
         if best[0] >= 0:
             columns = [
-                found[k].column(pricer, k, sets)
-                for k, sets in zip(pool.group[best].tolist(), pool.sets[best], strict=True)
+                found[k].column(sets) for k, sets in zip(pool.group[best].tolist(), pool.sets[best], strict=True)
             ]
             columns.sort(key=lambda column: column.group)
             standing.offer([column.path for column in columns])

@@ -21,9 +21,9 @@ from react_opt.solvers.routes.labelstore import MaskArray
 from react_opt.solvers.routes.master import Master, MasterPoint
 from react_opt.solvers.routes.region import everything
 from react_opt.solvers.routes.setcuts import Bits, SetCut, separate_sets
-from react_opt.solvers.routes.setprices import cost_of_sets
+from react_opt.solvers.routes.setprices import cost_of_sets, set_prices
 
-FIRST_COLUMNS, COLUMNS = 400, 120
+FIRST_COLUMNS, COLUMNS = 400, 160
 ACTIVE = 20_000  # routes that are priced each time; all others only when these do not help any more
 SMOOTHING = 0.6
 EARLY = 0.03  # part of what the programme lies above the incumbent
@@ -61,7 +61,8 @@ class PoolProgram:
     pool
         The routes.
     first
-        Prices to begin with; ``bound`` and ``group`` are of no consequence.
+        Prices to begin with, at which all routes that a better plan can contain have been listed if ``whole``;
+        ``bound`` and ``group`` are of no consequence.
     counts
         Robots of each class.
     must
@@ -70,6 +71,8 @@ class PoolProgram:
         The best plan so far and the limits.
     threads
         Threads for HiGHS, as many as in the master of the column generation: its scheduler serves one number only.
+    whole
+        Whether no route is missing. If some are, the bound holds for plans of these routes only.
     """
 
     def __init__(
@@ -80,20 +83,39 @@ class PoolProgram:
         must: NDArray[np.bool_],
         standing: Standing,
         threads: int = 1,
+        *,
+        whole: bool = True,
     ) -> None:
         n = len(first.cell)
-        self.pool, self.must, self._standing = pool, must, standing
+        self.pool, self.must, self._standing, self._whole = pool, must, standing, whole
         self._counts = np.array(counts, dtype=np.int64)
         self._master = Master(n, counts, 2.0 * float(np.abs(pool.value).max()) * (1 + sum(counts)) + 1.0, threads)
         self._master.restrict(replace(everything(len(counts), n, 0), must=must))
-        self._route: dict[Column, int] = {}  # of each column of the master
         self._add(np.arange(min(FIRST_COLUMNS, len(pool.value))))
         self._master.add_cuts(first.cuts)
         self._active = self._first()
         self._stalled = 0
         self.prices = first
-        self.stages: list[PoolPrices] = []  # prices at which routes were dropped
+        self.stages = [first] if whole else []  # prices at which routes were dropped, or were not listed
         self._look(first.cell, first.price, np.inf)
+
+    def renew(self, pool: Pool, prices: PoolPrices, *, whole: bool) -> None:
+        """Go on with another list: what was worth most at the last prices among all routes.
+
+        Parameters
+        ----------
+        pool
+            The routes, with what they lose at these prices.
+        prices
+            The prices, with the bound and the most that a route of each class is worth among all.
+        whole
+            Whether no route is missing that a plan better than the incumbent can contain.
+        """
+        self.pool, self.prices, self._whole, self._stalled = pool, prices, whole, 0
+        self._active = self._first()
+        if whole:
+            self.stages.append(prices)
+            self._forget(self._most_lost())
 
     @property
     def cuts(self) -> tuple[SetCut, ...]:
@@ -107,7 +129,7 @@ class PoolProgram:
         if floor is None:
             return False
         if point is None:
-            self._drop(self.prices.bound - floor + 1e-7 * max(1.0, abs(floor)))
+            self._drop()
             return False
         used = np.flatnonzero(point.use > TINY)
         inside = np.zeros((len(used), len(self.must)), dtype=np.uint8)
@@ -115,7 +137,7 @@ class PoolProgram:
             inside[row, list(self._master.columns[k].cells)] = 1
         gap = self.prices.bound - floor
         self._stalled = 0 if before - self.prices.bound > WORTH_IT * gap else self._stalled + 1
-        self._drop(gap + 1e-7 * max(1.0, abs(floor)))
+        self._drop()
         if gap <= 0.0 or self._stalled == PATIENCE:
             return False
         priced = dict(zip(self._master.cuts, point.duals.cut.tolist(), strict=True))
@@ -214,14 +236,7 @@ class PoolProgram:
         value, sets = self.pool.value, self.pool.sets
         if active is not None and len(active) < len(value):
             value, sets = value[active], sets[active]
-        priced = np.flatnonzero(cut > 0.0)
-        cuts = [self.cuts[k] for k in priced.tolist()]
-        shape = (len(cuts), max([len(one.cells) for one in cuts], default=1))
-        cells, times = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
-        for row, one in enumerate(cuts):
-            cells[row, : len(one.cells)], times[row, : len(one.cells)] = one.cells, one.times
-        over = np.array([one.over for one in cuts], dtype=np.int64)
-        reduced: FloatArray = value - cost_of_sets(sets, cell, cells, times, over, cut[priced])
+        reduced: FloatArray = value - cost_of_sets(sets, set_prices(cell, self.cuts, cut))
         return reduced
 
     def loss(self) -> FloatArray:
@@ -245,23 +260,43 @@ class PoolProgram:
         columns = []
         for r, inside in zip(routes.tolist(), inside_of(self.pool.sets[routes], len(self.must)), strict=True):
             cells = tuple(np.flatnonzero(inside).tolist())
-            column = Column(int(self.pool.group[r]), float(self.pool.value[r]), cells, None, (0,) * len(cells))
-            self._route[column] = r
-            columns.append(column)
+            columns.append(Column(int(self.pool.group[r]), float(self.pool.value[r]), cells, None, (0,) * len(cells)))
         return self._master.add(columns)
 
-    def _drop(self, most: float) -> None:
-        """Leave out the routes that lose more than ``most`` at the best prices."""
+    def _most_lost(self) -> float:
+        """What a route of a plan better than the incumbent can lose at the best prices."""
+        floor = self._standing.objective
+        return np.inf if floor is None else self.prices.bound - floor + 1e-7 * max(1.0, abs(floor))
+
+    def _drop(self) -> None:
+        """Leave out the routes that lose more than those of a better plan at the best prices."""
+        if not self._whole:
+            return
         self.stages.append(self.prices)
         loss = self.loss()
-        keep = np.flatnonzero(loss <= most)
+        keep = np.flatnonzero(loss <= self._most_lost())
         keep = keep[np.argsort(loss[keep], kind="stable")]
         self.pool = Pool(self.pool.value[keep], loss[keep], self.pool.group[keep], self.pool.sets[keep])
         self._active = self._first()
-        now = np.full(len(loss), -1)
-        now[keep] = np.arange(len(keep))
-        self._route = {column: int(now[r]) for column, r in self._route.items() if now[r] >= 0}
-        self._master.drop(lambda column: column not in self._route)
+        self._forget(self._most_lost())
+
+    def _forget(self, most: float) -> None:
+        """Drop columns of the master that lose more than ``most`` at the best prices."""
+        columns, (cell, price) = self._master.columns, self._extended()
+        value = np.array([column.value for column in columns], dtype=np.float64)
+        group = np.array([column.group for column in columns], dtype=np.int64)
+        sets = sets_of([column.cells for column in columns], len(cell))
+        reduced = value - cost_of_sets(sets, set_prices(cell, self.cuts, price))
+        gone = {id(columns[k]) for k in np.flatnonzero(self.prices.group[group] - reduced > most).tolist()}
+        self._master.drop(lambda column: id(column) in gone)
+
+
+def sets_of(cells: Sequence[tuple[int, ...]], n_cells: int) -> MaskArray:
+    """Return ``(m, words)``: sets of cells, 64 to a word."""
+    inside = np.zeros((len(cells), 64 * (-(-n_cells // 64))), dtype=np.uint8)
+    for row, held in enumerate(cells):
+        inside[row, list(held)] = 1
+    return np.packbits(inside, axis=1, bitorder="little").view(np.uint64)
 
 
 def inside_of(sets: MaskArray, n_cells: int) -> Bits:

@@ -21,7 +21,7 @@ from react_opt.solvers.routes.routecolumn import route_column
 
 MAX_LABELS = 20_000_000
 COARSE_SIZE = 8
-SHORT_LABELS = 100_000
+SHORT_LABELS = 1_000_000
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from itertools import product
 
@@ -12,6 +13,7 @@ from test_choice import _by_trying, _case
 from test_tree import grid_problem
 
 from react_opt.models.replay import value
+from react_opt.route_problem import FloatArray
 from react_opt.solvers.highs_model import fresh_scheduler
 from react_opt.solvers.routes import engine, finish
 from react_opt.solvers.routes.budget import Budget, Standing
@@ -23,6 +25,7 @@ from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pool import PoolPrices, PoolProgram
 from react_opt.solvers.routes.pricing import RoutePricer
 from react_opt.solvers.routes.setcuts import MULTIPLIERS, SetCut, separate_sets
+from react_opt.solvers.routes.setprices import set_prices
 from react_opt.solvers.routes.tightening import Tightening
 
 
@@ -41,21 +44,68 @@ def test_the_best_route_of_every_set_that_loses_little_is_enumerated(seed: int) 
         cells = {known: [i for i in range(problem.n_cells) if known >> i & 1] for known in every}
         reduced = {known: worth - price[cells[known]].sum() for known, worth in every.items()}
         floor = max(reduced.values()) - float(rng.integers(0, 15)) - 0.5
-        found = enumerate_routes(pricer, k, Duals(price, np.zeros(len(problem.classes)), none, none), floor)
+        duals = Duals(price, np.zeros(len(problem.classes)), none, none)
+        found = enumerate_routes(pricer, k, duals, floor)
         assert found is not None
-        got = dict(zip(found.sets[:, 0].tolist(), found.value.tolist(), strict=True))
+        look = found.look(set_prices(price, (), none), floor, 10_000)
+        assert look.whole_above <= floor
+        got = dict(zip(look.sets[:, 0].tolist(), look.value.tolist(), strict=True))
         wanted = {known: worth for known, worth in every.items() if reduced[known] >= floor}
         assert got == pytest.approx(wanted)
-        for known, one in zip(found.sets[:, 0].tolist(), found.sets, strict=True):
-            column = found.column(pricer, k, one)
+        for known, one in zip(look.sets[:, 0].tolist(), look.sets, strict=True):
+            column = found.column(one)
             assert sorted(column.cells) == cells[known]
             assert column.value == pytest.approx(wanted[known])
         for most in (3, 10, 30):  # the beginnings end earlier or later where one side has too many labels
-            again = enumerate_routes(
-                pricer, k, Duals(price, np.zeros(len(problem.classes)), none, none), floor, max_labels=most, threads=2
-            )
+            again = enumerate_routes(pricer, k, duals, floor, max_labels=most, threads=2)
             if again is not None:
-                assert dict(zip(again.sets[:, 0].tolist(), again.value.tolist(), strict=True)) == pytest.approx(wanted)
+                look = again.look(set_prices(price, (), none), floor, 10_000)
+                assert dict(zip(look.sets[:, 0].tolist(), look.value.tolist(), strict=True)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_enumerated_routes_are_found_at_other_prices(seed: int) -> None:
+    """Those worth most at prices of cells and cuts, not all of them; as many threads as there are find the same."""
+    problem = random_problem(seed)
+    rng = np.random.default_rng(seed)
+    n = problem.n_cells
+    base = rng.integers(0, 6, n).astype(np.float64)
+    none = np.zeros(0)
+    every = best_per_set(problem, problem.classes[0])
+    if not every:
+        return
+    floor = max(worth - _cost(known, base, (), none) for known, worth in every.items()) - 12.5
+    pricer = RoutePricer(problem, Memory(fewest_steps(problem), 2))
+    duals = Duals(base, np.zeros(len(problem.classes)), none, none)
+    price = rng.integers(0, 8, n).astype(np.float64)
+    cuts = [
+        SetCut(tuple(sorted(rng.choice(n, len(times), replace=False).tolist())), times, over)
+        for times, over in MULTIPLIERS
+        if len(times) <= n
+    ]
+    paid = rng.integers(0, 4, len(cuts)).astype(np.float64)
+    enumerated = [worth for worth in every.items() if worth[1] - _cost(worth[0], base, (), none) >= floor]
+    worths = {known: worth - _cost(known, price, cuts, paid) for known, worth in enumerated}
+    for threads in (1, 2):
+        found = enumerate_routes(pricer, 0, duals, floor, threads=threads)
+        assert found is not None
+        for most, least in ((10_000, -np.inf), (10_000, max(worths.values()) - 5.0), (4, -1e9)):
+            look = found.look(set_prices(price, cuts, paid), least, most)
+            got = dict(zip(look.sets[:, 0].tolist(), look.reduced.tolist(), strict=True))
+            assert {known: worths[known] for known in got} == pytest.approx(got)
+            assert {known for known, worth in worths.items() if worth > max(look.whole_above, least) + 1e-9} <= set(got)
+            assert look.whole_above <= least + 1e-9 or len(look.sets) < len(worths)
+            for known, one in zip(look.sets[:, 0].tolist(), look.sets, strict=True):
+                assert found.column(one).value == pytest.approx(every[known])
+
+
+def _cost(known: int, price: FloatArray, cuts: Sequence[SetCut], paid: FloatArray) -> float:
+    """What a set of cells costs, by the definition of cuts."""
+    cost = sum(price[i] for i in range(len(price)) if known >> i & 1)
+    for cut, worth in zip(cuts, paid.tolist(), strict=True):
+        times = [Fraction(t, cut.over) for cell, t in zip(cut.cells, cut.times, strict=True) if known >> cell & 1]
+        cost += worth * (sum(times) // 1)
+    return float(cost)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -69,16 +119,16 @@ def test_cuts_over_sets_hold_for_all_plans_and_are_broken_where_they_are_separat
     cuts = separate_sets(inside, share, set(), 500)
     assert {len(cut.cells) for cut in cuts} <= {3, 4, 5}
     for cut in cuts:
-        assert share @ cut.coefficients(inside) > cut.rhs + 0.01
+        assert share @ cut.coefficients((), inside) > cut.rhs + 0.01
         assert (tuple(sorted(cut.times, reverse=True)), cut.over) in MULTIPLIERS
         parts = [Fraction(time, cut.over) for time in cut.times]
         assert cut.rhs == sum(parts) // 1
         exact = [sum(p for cell, p in zip(cut.cells, parts, strict=True) if row[cell]) // 1 for row in inside]
-        assert cut.coefficients(inside).tolist() == exact
+        assert cut.coefficients((), inside).tolist() == exact
         for owner in product(range(3), repeat=len(cut.cells)):  # any way to share the cells among three routes
             plan = np.zeros((3, n), dtype=np.uint8)
             plan[list(owner), list(cut.cells)] = 1
-            assert cut.coefficients(plan).sum() <= cut.rhs
+            assert cut.coefficients((), plan).sum() <= cut.rhs
     if seed == 0:
         assert separate_sets(inside, share, set(cuts), 500) != cuts
 
@@ -134,6 +184,7 @@ def test_optima_by_the_programme_over_routes(monkeypatch: pytest.MonkeyPatch) ->
         best = solve_routes(problem, work_limit=6000).objective
         with monkeypatch.context() as weak:
             weak.setattr(finish, "FIRST_WORK", -1)
+            weak.setattr(finish, "MOST_ROUTES", 4 + 30 * (seed % 2))  # lists that lack routes, or hardly do
             weak.setattr(engine, "FIRST_MEMORY", 1)
             weak.setattr(Tightening, "cut", lambda self: False)
             weak.setattr(Tightening, "grow_memory", lambda self: False)
