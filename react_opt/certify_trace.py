@@ -231,7 +231,9 @@ class _Replay:
             return 0.0, self._most(profile, end_s - start_s)  # it ends between two instants
         length = np.hypot(*np.diff(part[:, :2], axis=0).T)
         turned = np.abs(_wrapped(np.diff(part[:, 2])))
-        turning = profile.turn_w * float(turned.sum()) / profile.turn_rad_s
+        whole = profile.turn_rad_s * self.step_s
+        back = max(0.0, whole - float(turned.min())) if turned.max() > 0.5 * whole else 0.0  # to and fro within a step
+        turning = profile.turn_w * (float(turned.sum()) + back) / profile.turn_rad_s
         base = profile.idle_w * alive + profile.sensing_w * float(part[:-1, 3].sum()) * self.step_s
         metre = profile.motion_w / profile.speed_max_m_s
         low = base + metre * float(length.sum())

@@ -93,6 +93,21 @@ def test_creeping_back_between_two_instants_is_paid_for_beside_walls_alone() -> 
     assert [most_j[t] for t in amid] == [open_j[t] for t in amid]
 
 
+def test_turning_to_and_fro_within_one_step_of_a_second_is_paid_for() -> None:
+    """A robot on the spot turns by whole steps and is then told to turn back: its track shows less than it turned."""
+    trace = Simulation(mission([(2.5, 2.5)], horizon_s=5.0), TWO_ROOMS).run()
+    replay = _Replay(trace)
+    track = np.zeros((5, 4))
+    track[:, :2] = trace.tracks[0].array()[0, :2]
+    replay.tracks = [track]
+    still_j = replay._spent(0, 0.0, 1.0)[1]
+    step_rad = 0.25 * JACKAL.turn_rad_s
+    track[:, 2] = step_rad * np.array([0, 1, 2, 3, 3])
+    assert replay._spent(0, 0.0, 1.0)[1] - still_j == pytest.approx(4 * 0.25 * JACKAL.turn_w)
+    track[:, 2] = step_rad * np.array([0, 1, 2, 3, 4])
+    assert replay._spent(0, 0.0, 1.0)[1] - still_j == pytest.approx(4 * 0.25 * JACKAL.turn_w)  # no step is left for it
+
+
 def test_a_coverage_that_is_not_so_is_named(good: Trace) -> None:
     def change(frames: Any) -> None:
         frames[-1]["coverage"] -= 0.01
