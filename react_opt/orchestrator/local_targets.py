@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import hypot
 
 from react_opt.orchestrator.belief import Belief, LocalTarget, RobotView
-from react_opt.orchestrator.regions import FREE_SHARE, Region, Regions
+from react_opt.orchestrator.regions import Region, Regions
 from react_opt.orchestrator.strategy import Point
 from react_opt.orchestrator.survey import Survey
 
@@ -54,12 +54,12 @@ class LocalTargets:
             self._serial += 1
             named[f"k{self._serial}"] = region
         self._named = named
-        return tuple(_target(name, region) for name, region in named.items())
+        return tuple(_target(name, region, self.regions.hidden_space.free_share) for name, region in named.items())
 
 
-def _target(name: str, region: Region) -> LocalTarget:
+def _target(name: str, region: Region, free_share: float) -> LocalTarget:
     """Return a region as a target: what a look reveals is its size, what lies behind it may open."""
-    size_m2 = region.value_m2 / FREE_SHARE
+    size_m2 = region.value_m2 / free_share
     return LocalTarget(
         id=name,
         area=region.area,

@@ -8,7 +8,8 @@ before the next one.
   stays the same one as long as its hidden ground does, wherever its frontier moves.
 * The tours of all robots through all targets are planned together (:mod:`react_opt.orchestrator.tours`), so that
   coverage grows early and the end comes soon: a small region is taken along where coming back for it would cost more,
-  an area that has been seen in passing is no target any more.
+  or where it is worth the time at a price per m^2 that is the same in each decision; an area that has been seen in
+  passing is no target any more. Crumbs are left until nothing else is.
 * Robots are led through the next few places of their tours on ways that are quick to drive
   (:mod:`react_opt.orchestrator.guide`, :mod:`react_opt.orchestrator.smooth`).
 
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
 from react_opt.orchestrator.guide import Guide
 from react_opt.orchestrator.orders import able
-from react_opt.orchestrator.regions import Region, Regions
+from react_opt.orchestrator.regions import HiddenSpace, Region, Regions
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
 from react_opt.orchestrator.survey import COARSE, Block, Survey
 from react_opt.orchestrator.survey_drives import ways_out
@@ -33,9 +34,17 @@ from react_opt.orchestrator.views import count_seen
 
 REPLAN_S = 3.0
 TRIES = 8
-SHARES = np.array([0.8, 0.9, 0.95, 0.97, 0.99, 1.0])
-WEIGHTS = np.array([0.2, 0.6, 0.5, 3.0, 2.0, 1.5])
+SHARES = np.array([0.7, 0.8, 0.9, 0.95, 0.97])
+WEIGHTS = np.array([0.3, 0.3, 0.6, 0.6, 3.0])
 """Shares of the expected whole whose times count, and how much."""
+SWEEPS = 16.0
+"""A m^2 is left behind if seeing it takes the fleet so many times what sweeping an open hall would take."""
+CRUMB_M2 = 0.5
+"""Regions that are worth less are left until there are no others."""
+HIDDEN_SPACE = HiddenSpace(free_share=0.7, mean_free_m=6.0, most_per_m=7.0)
+"""A room behind a door is worth most of what is hidden there: at a price, no closet is overrated."""
+HIDDEN_SLOWER = 1.5
+"""Ways through hidden space take so much longer, if there are any: most walls have another side."""
 KEEP_S = 2.0
 """What turning away from the present target costs, s: new plans must be better than that."""
 SERVICE_S = 1.0
@@ -84,8 +93,8 @@ class ReactPlus:
         """Return what changes now."""
         robots = able(belief)
         if self.survey is None or self.regions is None:
-            self.survey = Survey([robot.profile for robot in belief.robots])
-            self.regions = Regions(min(robot.profile.lidar_range_m for robot in belief.robots))
+            self.survey = Survey([robot.profile for robot in belief.robots], HIDDEN_SLOWER)
+            self.regions = Regions(min(robot.profile.lidar_range_m for robot in belief.robots), HIDDEN_SPACE)
         self.survey.update(belief.map, belief.version)
         notes: list[Note] = []
         if not robots:
@@ -150,6 +159,7 @@ class ReactPlus:
             for region in self.regions.find(self.survey, belief.areas, fields.min(axis=0), self.looked)
             if not any(np.hypot(region.at_m[0] - x, region.at_m[1] - y) < GIVE_UP_M for x, y, _ in self.given_up)
         ]
+        found = [region for region in found if region.value_m2 >= CRUMB_M2] or found
         found = sorted(found, key=lambda region: -region.value_m2)[:MOST_TARGETS]
         self.over = not found
         if not found:
@@ -162,7 +172,9 @@ class ReactPlus:
         known_m2 = float(np.count_nonzero(self.survey.blocks == OPEN)) * self.survey.block_m**2
         first = np.array([self._same(self.goals.get(robot.id), found) for robot in robots], dtype=np.int64)
         left_s = max(1.0, self.options.horizon_s - belief.t_s)
-        facts = (start_s, between_s, value, known_m2, SHARES, WEIGHTS, left_s, first, KEEP_S)
+        sweep_m2_s = sum(robot.profile.lidar_range_m * robot.profile.speed_max_m_s for robot in robots)
+        price_s = SWEEPS / sweep_m2_s
+        facts = (start_s, between_s, value, known_m2, SHARES, WEIGHTS, price_s, left_s, first, KEEP_S)
         begin, missing = self._begin(found, len(robots))
         order, _ = plan_tours(insert_all(begin, missing, *facts), *facts, WORK)
         tours = _split(order)

@@ -2,7 +2,7 @@
 
 Hidden space is shared out among the pieces of the frontier: each hidden block belongs to the piece it is nearest to
 through hidden space. How much of it a look from there reveals falls with its depth, since nobody knows what stands in
-the way: a share ``exp(-depth / MEAN_FREE_M)`` counts for the piece. Of what lies deeper than ``DEEP_M`` the rest
+the way: a share ``exp(-depth / mean_free_m)`` counts for the piece. Of what lies deeper than ``DEEP_M`` the rest
 counts for the area in which it lies, as something that has to be driven to. Where hidden space cannot be reached at
 all (the inside of a machine that has been seen from all sides) there is nothing to visit.
 """
@@ -26,14 +26,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 NONE = np.zeros((0, 2), dtype=np.int64)
-MEAN_FREE_M = 3.0
-"""Mean length of a look into hidden space, m."""
 DEEP_M = 5.0
 """What lies so deep is not looked into from the frontier: it is a matter of the area."""
-FREE_SHARE = 0.65
-"""Share of hidden space that is expected to be free; the rest is walls and what stands on the floor."""
-MOST_PER_M = 4.0
-"""A metre of frontier reveals at most so many m^2: little is seen through a slit."""
 SHORTEST_M = 0.3
 WIDEST_M = 5.0
 """Frontier pieces are between so long: shorter ones are noise, longer ones are cut."""
@@ -44,6 +38,25 @@ LOOKS_M = (0.0, 0.8, 1.6, 2.6, 4.0)
 LOOK_ANGLES = 12
 """Places to look from are tried around the middle of the frontier at these distances and so many directions."""
 LOOKED_BLOCKS = 2  # coarse blocks around where a robot looked from that are no place to look from again
+
+
+@dataclass(frozen=True)
+class HiddenSpace:
+    """What hidden space is expected to be like.
+
+    Parameters
+    ----------
+    free_share
+        Share of it that is free; the rest is walls and what stands on the floor.
+    mean_free_m
+        Mean length of a look into it, m.
+    most_per_m
+        A metre of frontier reveals at most so many m^2: little is seen through a slit.
+    """
+
+    free_share: float = 0.65
+    mean_free_m: float = 3.0
+    most_per_m: float = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +108,13 @@ class Regions:
     ----------
     range_m
         How far robots see, m.
+    hidden_space
+        What they expect of hidden space.
     """
 
-    def __init__(self, range_m: float) -> None:
+    def __init__(self, range_m: float, hidden_space: HiddenSpace | None = None) -> None:
         self.range_m = range_m
+        self.hidden_space = hidden_space or HiddenSpace()
         self._area_of: IntArray | None = None
         self._area_key: tuple[object, ...] = ()
 
@@ -142,11 +158,11 @@ class Regions:
         for n, cluster in enumerate(clusters):
             labels[cluster.blocks[:, 0], cluster.blocks[:, 1]] = n
         area_of = self.areas_of_blocks(survey, areas)
-        block_m2 = survey.block_m**2 * FREE_SHARE
+        block_m2 = survey.block_m**2 * self.hidden_space.free_share
         reached = np.isfinite(time_s)
         near, size, behind, owner, depth = share_out(
             survey.hidden, labels, len(clusters), area_of, len(areas), reached,
-            MEAN_FREE_M / survey.coarse_m,
+            self.hidden_space.mean_free_m / survey.coarse_m,
             DEEP_M / survey.coarse_m,
         )  # fmt: skip
         may_stand = reached.copy()
@@ -158,7 +174,7 @@ class Regions:
         members = [ground[depth[ground[:, 0], ground[:, 1]] <= 3.0 / survey.coarse_m] for ground in grounds]
         found = []
         for n, cluster in enumerate(clusters):
-            value = min(float(near[n]) * block_m2, MOST_PER_M * cluster.length_m)
+            value = min(float(near[n]) * block_m2, self.hidden_space.most_per_m * cluster.length_m)
             if value < LEAST_M2:
                 continue
             view, share = self._view(survey, cluster, members[n], time_s, may_stand)

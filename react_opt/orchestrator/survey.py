@@ -33,8 +33,6 @@ Block = tuple[int, int]
 
 BLOCK_M = 0.1
 COARSE = 2
-HIDDEN_SLOWER = 1.15
-"""Ways through hidden space are rarely straight: their time is taken to be so much longer."""
 NEAR_BLOCKS, CLOSED_IN_BLOCKS = 10, 50
 """A drive starts from the nearest coarse block within the first reach; if none leads anywhere, within the second."""
 SLACK_M = 0.1
@@ -68,9 +66,12 @@ class Survey:
     ----------
     profiles
         Of the robots: the widest footprint and the slowest speed count.
+    hidden_slower
+        Ways through hidden space are rarely straight, if there are any: their time is taken to be so much longer.
     """
 
-    def __init__(self, profiles: Sequence[RobotProfile]) -> None:
+    def __init__(self, profiles: Sequence[RobotProfile], hidden_slower: float = 1.15) -> None:
+        self.hidden_slower = hidden_slower
         self.radius_m = max(profile.radius_m for profile in profiles)
         self.profile = min(profiles, key=lambda profile: profile.speed_max_m_s)
         self.version = -1
@@ -104,7 +105,7 @@ class Survey:
         self.main = parts == np.argmax(sizes) if sizes.any() else self.may  # apart from islands among obstacles
         speed = self.profile.speed_m_s(clear_px * res, self.radius_m)
         self._slow: dict[bool, FloatArray] = {}  # of this map, by whether unknown space counts as free
-        self.slowness = np.where(self.known, 1.0, HIDDEN_SLOWER) * self.coarse_m / speed
+        self.slowness = np.where(self.known, 1.0, self.hidden_slower) * self.coarse_m / speed
 
     # --- places ---
 

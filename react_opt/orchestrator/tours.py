@@ -1,8 +1,10 @@
 """Tours of a fleet through targets of known worth: coverage early, and all of it soon.
 
-The tours minimise a weighted sum of the times at which the expected coverage reaches certain shares of the whole,
-the last of them being everything. That weighs the first square metres against the last ones: a small region on the
-way is taken along where coming back for it costs more than what waits. All robots are planned together.
+The tours minimise a weighted sum of the times at which the expected coverage reaches certain shares of the whole, and
+of the end. That weighs the first square metres against the last ones: a small region on the way is taken along where
+coming back for it costs more than what waits. The end comes when going on costs more than what is left behind is worth,
+at a price per unit of worth: a visit is made in passing if the time that it costs is less than its price, however much
+of the whole is still to come, and nothing is planned for the sake of crumbs. All robots are planned together.
 """
 
 from __future__ import annotations
@@ -15,10 +17,14 @@ from react_opt.kernels import kernel
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-Facts = tuple[FloatArray, FloatArray, FloatArray, float, FloatArray, FloatArray, float, IntArray, float, FloatArray]
+Facts = tuple[
+    FloatArray, FloatArray, FloatArray, float, FloatArray, FloatArray, float, float, IntArray, float, FloatArray
+]
 
-LATE = 3.0
-"""A share that is not reached in time costs so many times the time left."""
+END = 3.0
+"""Weight of the end."""
+MISSED_S = 300.0
+"""What it costs to reach nothing of the whole in time, s; of a part of it as much less."""
 
 
 @kernel
@@ -30,6 +36,7 @@ def tour_cost(
     known: float,
     shares: FloatArray,
     weights: FloatArray,
+    price_s: float,
     left_s: float,
     first: IntArray,
     keep_s: float,
@@ -47,8 +54,10 @@ def tour_cost(
         ``(K,)`` worth of each target, and what is covered already, in the same unit.
     shares, weights
         Shares of all there is, increasing, and what each second until they are reached costs.
+    price_s
+        What it costs to leave a unit of worth behind at the end, s.
     left_s
-        Time left; later visits earn nothing.
+        Time left; what is visited later counts as missed.
     first, keep_s
         ``(R,)`` target that each robot is on its way to (-1: none), and what turning away from it costs.
     arrive
@@ -58,7 +67,7 @@ def tour_cost(
     robot, at, now, cost = 0, -1, 0.0, 0.0
     length = np.zeros(robots, dtype=np.int64)
     worth = np.empty((robots, count + 1))
-    spread = 0.0
+    spread, missed = 0.0, 0.0
     for n in range(order.shape[0]):
         k = order[n]
         if k < 0:
@@ -74,6 +83,8 @@ def tour_cost(
         arrive[robot, length[robot]], worth[robot, length[robot]] = now, value[k]
         length[robot] += 1
         spread += now * value[k]
+        if now > left_s:
+            missed += value[k]
     total = known
     for k in range(count):
         total += value[k]
@@ -81,23 +92,21 @@ def tour_cost(
     while step < shares.shape[0] and covered >= shares[step] * total - 1e-9:
         step += 1
     cursor = np.zeros(robots, dtype=np.int64)
-    last = 0.0
+    end = price_s * (total - covered)
     while True:
         best, when = -1, np.inf
         for r in range(robots):
             if cursor[r] < length[r] and arrive[r, cursor[r]] < when:
                 best, when = r, arrive[r, cursor[r]]
-        if best < 0 or when > left_s:
+        if best < 0:
             break
         covered += worth[best, cursor[best]]
         cursor[best] += 1
-        last = when
+        end = min(end, when + price_s * (total - covered))
         while step < shares.shape[0] and covered >= shares[step] * total - 1e-9:
             cost += weights[step] * when
             step += 1
-    while step < shares.shape[0]:
-        cost += weights[step] * LATE * max(left_s, last)
-        step += 1
+    cost += END * end + MISSED_S * missed / (total + 1e-9)
     driven = 0.0
     for r in range(robots):
         if length[r] > 0:
@@ -114,6 +123,7 @@ def plan_tours(
     known: float,
     shares: FloatArray,
     weights: FloatArray,
+    price_s: float,
     left_s: float,
     first: IntArray,
     keep_s: float,
@@ -136,7 +146,7 @@ def plan_tours(
     """
     robots, count = start_s.shape
     arrive = np.empty((robots, count + 1))
-    facts = (start_s, between_s, value, known, shares, weights, left_s, first, keep_s, arrive)
+    facts = (start_s, between_s, value, known, shares, weights, price_s, left_s, first, keep_s, arrive)
     best = begin.copy()
     best_cost, done = _descend(best, facts, work)
     n = best.shape[0]
@@ -233,6 +243,7 @@ def insert_all(
     known: float,
     shares: FloatArray,
     weights: FloatArray,
+    price_s: float,
     left_s: float,
     first: IntArray,
     keep_s: float,
@@ -240,6 +251,7 @@ def insert_all(
     """Return tours with the missing targets put in one after the other, each where it costs least."""
     robots, count = start_s.shape
     arrive = np.empty((robots, count + 1))
+    facts = (start_s, between_s, value, known, shares, weights, price_s, left_s, first, keep_s, arrive)
     now = order.copy()
     for m in range(missing.shape[0]):
         n = now.shape[0]
@@ -247,7 +259,7 @@ def insert_all(
         trial = np.empty(n + 1, dtype=np.int64)
         for j in range(n + 1):
             trial[:j], trial[j], trial[j + 1 :] = now[:j], missing[m], now[j:]
-            new = tour_cost(trial, start_s, between_s, value, known, shares, weights, left_s, first, keep_s, arrive)
+            new = tour_cost(trial, *facts)
             if new < cost:
                 best, cost = j, new
         after = np.empty(n + 1, dtype=np.int64)

@@ -11,15 +11,18 @@ from react_opt.orchestrator.tours import insert_all, plan_tours, tour_cost
 
 SHARES = np.array([0.8, 0.97, 1.0])
 WEIGHTS = np.array([1.0, 2.0, 1.0])
+PRICE_S = 10.0
 
 
-def line(at: list[float], starts: list[float], value: list[float], left_s: float = 1000.0):  # type: ignore[no-untyped-def]
+def line(  # type: ignore[no-untyped-def]
+    at: list[float], starts: list[float], value: list[float], left_s: float = 1000.0, price_s: float = PRICE_S
+):
     """Return the facts of targets on a line, where a metre takes a second."""
     x, s = np.array(at), np.array(starts)
     first = np.full(len(s), -1, dtype=np.int64)
     return (
-        np.abs(s[:, None] - x[None]), np.abs(x[:, None] - x[None]), np.array(value), 0.0, SHARES, WEIGHTS, left_s,
-        first, 0.0,
+        np.abs(s[:, None] - x[None]), np.abs(x[:, None] - x[None]), np.array(value), 0.0, SHARES, WEIGHTS, price_s,
+        left_s, first, 0.0,
     )  # fmt: skip
 
 
@@ -36,7 +39,7 @@ def test_small_fleets_get_the_best_of_all_tours(seed: int) -> None:
     facts = (
         np.hypot(*(starts[:, None] - points[None]).transpose(2, 0, 1)),
         np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)),
-        rng.uniform(1, 9, 4), 5.0, SHARES, WEIGHTS, 1000.0, np.full(2, -1, dtype=np.int64), 0.0,
+        rng.uniform(1, 9, 4), 5.0, SHARES, WEIGHTS, PRICE_S, 1000.0, np.full(2, -1, dtype=np.int64), 0.0,
     )  # fmt: skip
     best = min(
         tour_cost(np.array(order), *facts, np.empty((2, 5))) for order in itertools.permutations([0, 1, 2, 3, -1])
@@ -61,11 +64,30 @@ def test_two_robots_share_the_work() -> None:
 def test_a_robot_keeps_its_target_unless_another_is_better_by_more_than_turning_costs() -> None:
     facts = list(line([10.0, -9.0], [0.0], [5.0, 5.0]))
     assert planned(tuple(facts))[0].tolist() == [1, 0]
-    facts[7], facts[8] = np.array([0], dtype=np.int64), 3.0
+    facts[8], facts[9] = np.array([0], dtype=np.int64), 3.0
     assert planned(tuple(facts))[0].tolist() == [0, 1]
 
 
 def test_what_cannot_be_reached_in_time_comes_last() -> None:
-    """With 12 s left the large region at 30 is out of reach: the small one at 10 is visited first."""
+    """With 12 s left the large region at 30 is out of reach: the small one behind is visited first."""
     order, _ = planned(line([30.0, 10.0], [0.0], [50.0, 5.0], left_s=12.0))
     assert order.tolist() == [1, 0]
+
+
+@pytest.mark.parametrize(("price_s", "first"), [(1.0, 1), (30.0, 0)])
+def test_a_closet_is_looked_into_in_passing_if_it_is_worth_its_time(price_s: float, first: int) -> None:
+    """A closet is 4 s off the way to a hall, which makes nearly all of the whole: 8 s for a worth of 1."""
+    start = np.array([[4.0, 10.0]])
+    between = np.array([[0.0, 14.0], [14.0, 0.0]])
+    facts = (
+        start, between, np.array([1.0, 200.0]), 0.0, np.array([0.97]), np.array([0.0]), price_s, 1000.0,
+        np.array([-1]), 0.0,
+    )  # fmt: skip
+    assert planned(facts)[0][0] == first
+
+
+@pytest.mark.parametrize("left_s", [1000.0, 45.0])
+def test_a_crumb_that_will_be_too_late_is_not_fetched_first(left_s: float) -> None:
+    """A large region at 20 and a crumb at -10: after the region the crumb takes until 50."""
+    order, _ = planned(line([20.0, -10.0], [0.0], [60.0, 0.1], left_s))
+    assert order.tolist() == [0, 1]
