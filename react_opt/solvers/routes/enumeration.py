@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.columns import Column, Duals, Rank1Cut
@@ -55,7 +56,8 @@ class Enumeration:
     pricer, group
         The pricer and the class.
     beginnings, rests
-        Labels of both directions and their sets; what comes before ``first`` among the rests is not needed.
+        Labels of both directions and their sets; those that cannot be put together with others are left out, and
+        rests in nodes before ``first``.
     first
         Node of kernel time.
     paid
@@ -88,17 +90,19 @@ class Enumeration:
         self._labels = beginnings[0], rests[0]
         self._seam = seam
         none = set_prices(cell, (), np.zeros(0))
-        self._ahead, self._behind = (
+        ahead, behind = (
             Half(
                 labels.start, sets, labels.value + cost_of_sets(sets, none), labels.value - paid, labels.value - paid,
                 labels.cuts, labels.fuel, labels.sensed | (labels.arc == ORIGIN),
             )
             for labels, sets, paid in (beginnings, rests)
         )  # fmt: skip
-        self._skipped = int(rests[0].start[min(first, len(rests[0].start) - 1)])
-        start = np.maximum(rests[0].start - self._skipped, 0)
-        self._behind = _taken(self._behind, slice(self._skipped, None))._replace(start=start)
-        self._node = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        n, node = len(cell), _nodes(ahead.start)
+        late = node // n > (len(ahead.start) - 1) // n - 1 - seam.arc_steps.max(initial=1)
+        whole = ahead.last & (ahead.base + seam.idle_end.ravel()[node] >= cutoff)
+        self._ahead, self._ahead_kept = _only(ahead, late | whole)
+        self._behind, self._behind_kept = _only(behind, _nodes(behind.start) >= first)
+        self._behind_node = _nodes(self._behind.start)
         self._found: list[tuple[MaskArray, IntArray]] = []
 
     def look(self, prices: SetPrices, least: float, most: int) -> Look:
@@ -115,19 +119,20 @@ class Enumeration:
         """
         ahead = self._ahead._replace(value=self._ahead.gross - cost_of_sets(self._ahead.sets, prices))
         behind = self._behind._replace(value=self._behind.gross - cost_of_sets(self._behind.sets, prices))
-        order = np.lexsort((-behind.value, self._node))
+        order = np.lexsort((-behind.value, self._behind_node))
         behind = _taken(behind, order)
         many = 2 if self._threads > 1 else 1
         with ThreadPoolExecutor(many) as executor:
             jobs = [
                 executor.submit(
-                    join_sets, ahead, behind, order + self._skipped, self._seam, prices, self._cutoff,
+                    join_sets, ahead, behind, self._behind_kept[order], self._seam, prices, self._cutoff,
                     least - self._constant, most, (part, many), self.pricer.stop,
                 )
                 for part in range(many)
             ]  # fmt: skip
             found = [job.result() for job in jobs]
         sets, gross, value, parts = (np.concatenate([one[k] for one in found]) for k in range(4))
+        parts[:, 0] = self._ahead_kept[parts[:, 0]]
         above = max(one[4] for one in found)
         if many > 1:  # what one of them has left out may be a better way to a set that another has found
             kept = np.flatnonzero(value >= above)
@@ -218,9 +223,21 @@ def enumerate_routes(
     return Enumeration(pricer, group, found[0], found[1], first, duals.cell, seam, floor, ends.cutoff, threads)
 
 
-def _taken(half: Half, places: slice | IntArray) -> Half:
+def _taken(half: Half, places: IntArray) -> Half:
     """Return some of the labels of one direction."""
     return Half(
         half.start, half.sets[places], half.gross[places], half.base[places], half.value[places], half.cuts[places],
         half.fuel[places], half.last[places],
     )  # fmt: skip
+
+
+def _nodes(start: IntArray) -> IntArray:
+    """Return the node of each label."""
+    return np.repeat(np.arange(len(start) - 1), np.diff(start))
+
+
+def _only(half: Half, needed: NDArray[np.bool_]) -> tuple[Half, IntArray]:
+    """Return the labels of one direction that are needed, and which these are."""
+    kept = np.flatnonzero(needed)
+    start = np.concatenate(([0], np.cumsum(needed)))[half.start]
+    return _taken(half, kept)._replace(start=start), kept

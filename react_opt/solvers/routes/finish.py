@@ -21,7 +21,7 @@ from react_opt.solvers.routes.setprices import set_prices
 
 EASIER = 0.85  # share of the last hopeless gap at which it is tried again
 LEAST, MOST = 400_000, 6_000_000  # labels of each direction; in between twice as many as labels priced so far
-MOST_ROUTES = 200_000  # in the linear programme
+MOST_ROUTES = 300_000  # in the linear programme
 PATIENCE = 5  # looks at all routes that may fail to lower the bound by so much of the gap
 FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choosing among them, at most about a second
 
@@ -165,7 +165,7 @@ class Finish:
                 break
             pool, prices, whole = listed
             # where the part stood for all routes it may do so a little longer
-            rounds = rounds + 1 if prices.bound <= expected + TINY else 1
+            rounds = 2 if prices.bound <= expected + TINY else 1
             failed = 0 if best.bound - prices.bound > WORTH_IT * self._gap(best) else failed + 1
             best = min(best, prices, key=lambda one: one.bound)
             program.renew(pool, prices, whole=whole)

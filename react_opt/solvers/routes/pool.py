@@ -24,6 +24,7 @@ from react_opt.solvers.routes.setcuts import Bits, SetCut, separate_sets
 from react_opt.solvers.routes.setprices import cost_of_sets, set_prices
 
 FIRST_COLUMNS, COLUMNS = 400, 160
+MOST_COLUMNS = 6000  # then half of them are dropped
 ACTIVE = 20_000  # routes that are priced each time; all others only when these do not help any more
 SMOOTHING = 0.6
 EARLY = 0.03  # part of what the programme lies above the incumbent
@@ -187,6 +188,8 @@ class PoolProgram:
             self._standing.budget.spend()
             if point is None:
                 return None
+            if len(self._master.columns) > MOST_COLUMNS:
+                self._master.keep_best(point, MOST_COLUMNS // 2)
             cell = smoothing * centre_cell + (1.0 - smoothing) * point.duals.cell
             cut = smoothing * centre_cut + (1.0 - smoothing) * point.duals.cut
             if whole:
