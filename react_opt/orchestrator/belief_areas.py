@@ -172,8 +172,8 @@ class Areas:
 
     def _discover(self) -> bool:
         """Add areas where known free space lies beyond the grid; tell whether there were any."""
-        outside = self._map.touched & (self._map.known > 0) & (self._map.solid == 0) & ~self._map.inside
-        if not outside.any():
+        outside = self._map.touched & ~self._map.inside
+        if not outside.any() or not (outside & (self._map.known > 0) & (self._map.solid == 0)).any():
             return False
         rows, cols = np.nonzero((self._map.known > 0) & (self._map.solid == 0))
         a = np.floor((self._map.col0 + (cols + 0.5) * self._map.k - self._origin[0]) / self._side).astype(int)

@@ -21,6 +21,29 @@ IntArray = NDArray[np.int64]
 Numbers = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 Slowness = NDArray[np.float32]
+Cells = NDArray[np.uint8]
+
+
+MOVES = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
+"""Rows and columns from a block to those around it, in the order in which they are looked at."""
+
+
+class Ground:
+    """What drives lead over: for all fields on the same slowness.
+
+    Parameters
+    ----------
+    slow
+        :func:`slowness`; must not change any more.
+    """
+
+    def __init__(self, slow: Slowness) -> None:
+        self.slow = slow
+        self.slowest = float(slow.max(initial=0.0))
+        self.rimmed = np.zeros((slow.shape[0] + 2, slow.shape[1] + 2), dtype=np.float32)
+        """With a rim of impassable blocks."""
+        self.rimmed[1:-1, 1:-1] = slow
+        self.moves = moves_from(self.rimmed)
 
 
 class Field:
@@ -31,8 +54,8 @@ class Field:
 
     Parameters
     ----------
-    slow
-        :func:`slowness`; a field is good as long as this holds.
+    ground
+        What the drives lead over.
     starts
         Numbers of the blocks to start from, row by row, none of them twice (they may be impassable: moves lead out).
     side_m
@@ -41,15 +64,13 @@ class Field:
         The largest speed.
     """
 
-    def __init__(self, slow: Slowness, starts: Sequence[int], side_m: float, fastest_m_s: float) -> None:
-        rows, cols = slow.shape
-        self._cols, self._side_m = cols, side_m
-        self._rimmed = np.zeros((rows + 2, cols + 2), dtype=np.float32)
-        self._rimmed[1:-1, 1:-1] = slow
+    def __init__(self, ground: Ground, starts: Sequence[int], side_m: float, fastest_m_s: float) -> None:
+        self._ground, self._side_m = ground, side_m
+        self._cols = ground.slow.shape[1]
         self._width_s = side_m / fastest_m_s
-        slowest = max(float(slow.max(initial=0.0)), 1.0 / fastest_m_s)
+        slowest = max(ground.slowest, 1.0 / fastest_m_s)
         self._start_slow = np.float32(slowest)
-        size = self._rimmed.size
+        size = ground.rimmed.size
         self._time_s = np.full(size, np.inf)
         self._settled = np.zeros(size, dtype=np.bool_)
         self._before, self._after, self._ahead = (np.empty(size, dtype=np.int32) for _ in range(3))
@@ -63,20 +84,27 @@ class Field:
         at = self._settle(blocks)
         return np.asarray(self._time_s[at])
 
+    def reached_s(self, blocks: IntArray) -> FloatArray:
+        """Return s to blocks (-1: to nowhere), NaN where there is no way."""
+        times = np.full(len(blocks), np.nan)
+        times[blocks >= 0] = self.times_s(blocks[blocks >= 0])
+        times[np.isinf(times)] = np.nan
+        return times
+
     def lengths_m(self, blocks: ArrayLike) -> FloatArray:
         """Return m to blocks on the ways that are fastest, 0 where there is none."""
-        return lengths(self._before, self._time_s, self._settle(blocks), self._rimmed.shape[1], self._side_m)
+        return lengths(self._before, self._time_s, self._settle(blocks), self._cols + 2, self._side_m)
 
     def way(self, block: int) -> IntArray:
         """Return the blocks of the drive to one, pulled straight where that is no slower; empty without a way."""
         (goal,) = self._settle([block])
-        way = way_to(self._rimmed, self._before, self._time_s, goal, self._side_m)
-        return np.asarray(way - 2 * (way // self._rimmed.shape[1]) - self._rimmed.shape[1] + 1)
+        way = way_to(self._ground.rimmed, self._before, self._time_s, goal, self._side_m)
+        return np.asarray(way - 2 * (way // (self._cols + 2)) - self._cols - 1)
 
     def all_times_s(self) -> FloatArray:
         """Return s to every block, row by row, infinite where there is no way."""
         self._advance(np.array([-1], dtype=np.int64))
-        return self._time_s.reshape(self._rimmed.shape)[1:-1, 1:-1].ravel()
+        return self._time_s.reshape(self._ground.rimmed.shape)[1:-1, 1:-1].ravel()
 
     def _inside(self, blocks: ArrayLike) -> IntArray:
         """Return the numbers of blocks in the grid with its rim."""
@@ -90,7 +118,7 @@ class Field:
 
     def _advance(self, goals: IntArray) -> None:
         _search(
-            self._rimmed.ravel(), self._rimmed.shape[1], goals, self._side_m, self._width_s, self._start_slow,
+            self._ground.rimmed, self._ground.moves, goals, self._side_m, self._width_s, self._start_slow,
             self._time_s, self._settled, self._before, self._after, self._ahead, self._head, self._state,
         )  # fmt: skip
 
@@ -125,6 +153,32 @@ def _slowness(
 
 
 @kernel
+def moves_from(slow: Slowness) -> Cells:
+    """Return for each block of a grid with a rim which of :data:`MOVES` lead on, one bit each."""
+    rows, cols = slow.shape
+    free = np.empty((rows, cols), dtype=np.uint8)
+    for r in range(rows):
+        for c in range(cols):
+            free[r, c] = slow[r, c] > 0
+    moves = np.zeros((rows, cols), dtype=np.uint8)
+    for r in range(1, rows - 1):
+        high, same, low, out = free[r - 1], free[r], free[r + 1], moves[r]
+        for c in range(1, cols - 1):  # an oblique move leads between two passable blocks
+            left, right = same[c - 1], same[c + 1]
+            out[c] = (
+                (high[c] & left & high[c - 1])
+                | (high[c] << 1)
+                | ((high[c] & right & high[c + 1]) << 2)
+                | (left << 3)
+                | (right << 4)
+                | ((low[c] & left & low[c - 1]) << 5)
+                | (low[c] << 6)
+                | ((low[c] & right & low[c + 1]) << 7)
+            )
+    return moves
+
+
+@kernel
 def _begin(
     starts: IntArray,
     time: FloatArray,
@@ -147,8 +201,8 @@ def _begin(
 
 @kernel
 def _search(
-    slow: Slowness,
-    cols: int,
+    ground: Slowness,
+    moves: Cells,
     goals: IntArray,
     side_m: float,
     width: float,
@@ -166,7 +220,11 @@ def _search(
     ``after`` and ``ahead`` are doubly linked lists of waiting blocks, one per bucket, from ``head`` on. ``state``
     holds how many wait and the number of the bucket whose turn it is.
     """
-    straight, slant = 0.5 * side_m, 0.5 * (side_m * np.sqrt(2.0))
+    slow, may = ground.reshape(-1), moves.reshape(-1)
+    steps, metres = np.empty(8, dtype=np.int64), np.empty(8)
+    for k in range(8):
+        steps[k] = MOVES[k][0] * ground.shape[1] + MOVES[k][1]
+        metres[k] = 0.5 * (side_m * np.sqrt(2.0) if MOVES[k][0] != 0 and MOVES[k][1] != 0 else side_m)
     mask = head.shape[0] - 1
     waiting, bucket = state[0], state[1]
     for n in range(goals.shape[0]):
@@ -183,38 +241,31 @@ def _search(
             waiting -= 1
             settled[here] = True
             mine = slow[here] if slow[here] > 0 else start_slow
-            left, right = slow[here - 1] > 0, slow[here + 1] > 0
-            for dr in range(-1, 2):
-                middle = here + dr * cols
-                if dr != 0 and slow[middle] <= 0:
-                    continue  # no way straight there, so none across its corners
-                for dc in range(-1, 2):
-                    if (dc == 0 and dr == 0) or (dc < 0 and not left) or (dc > 0 and not right):
-                        continue
-                    there = middle + dc
-                    if slow[there] <= 0:
-                        continue
-                    t = time[here] + (slant if dr != 0 and dc != 0 else straight) * (mine + slow[there])
-                    known = time[there]
-                    if t >= known or settled[there]:
-                        continue
-                    if known < np.inf:  # take it out of its bucket
-                        low, high = after[there], ahead[there]
-                        if high >= 0:
-                            after[high] = low
-                        else:
-                            head[int(known / width) & mask] = low
-                        if low >= 0:
-                            ahead[low] = high
+            for k in range(8):
+                if not (may[here] >> k) & 1:
+                    continue
+                there = here + steps[k]
+                t = time[here] + metres[k] * (mine + slow[there])
+                known = time[there]
+                if t >= known or settled[there]:
+                    continue
+                if known < np.inf:  # take it out of its bucket
+                    low, high = after[there], ahead[there]
+                    if high >= 0:
+                        after[high] = low
                     else:
-                        waiting += 1
-                    time[there], before[there] = t, here
-                    slot = int(t / width) & mask
-                    low = head[slot]
-                    after[there], ahead[there] = low, -1
+                        head[int(known / width) & mask] = low
                     if low >= 0:
-                        ahead[low] = there
-                    head[slot] = there
+                        ahead[low] = high
+                else:
+                    waiting += 1
+                time[there], before[there] = t, here
+                slot = int(t / width) & mask
+                low = head[slot]
+                after[there], ahead[there] = low, -1
+                if low >= 0:
+                    ahead[low] = there
+                head[slot] = there
     state[0], state[1] = waiting, bucket
 
 

@@ -227,32 +227,20 @@ def sight(open_: Bools, r0: int, c0: int, r1: int, c1: int) -> bool:
 
 @kernel
 def stand_for(
-    labels: Labels,
-    region: int,
-    window: IntArray,
-    row: float,
-    col: float,
-    open_: Bools,
-    reached: Bools,
-    range_blocks: float,
+    labels: Labels, region: int, window: IntArray, start: int, open_: Bools, reached: Bools, range_blocks: float
 ) -> int:
     """Return the reached block from which a region is best looked at, -1 for none.
 
-    A breadth-first search spreads from the region's block nearest to its centroid (``row``, ``col``) through open
-    blocks (known free or deep) until it meets a block that a robot reaches and from which the part of the region that
-    the search came through is in sight: the centroid made accessible.
+    A breadth-first search spreads from ``start``, the region's block nearest to its centroid, through open blocks
+    (known free or deep) until it meets a block that a robot reaches and from which the part of the region that the
+    search came through is in sight: the centroid made accessible.
     """
     rows, cols = labels.shape
     reach = int(range_blocks)
     top, bottom = max(0, window[0] - reach), min(rows, window[1] + reach)
     left, right = max(0, window[2] - reach), min(cols, window[3] + reach)
     height, width = bottom - top, right - left
-    best, start = np.inf, -1
-    for r in range(window[0], window[1]):
-        for c in range(window[2], window[3]):
-            gap = (r - row) ** 2 + (c - col) ** 2
-            if labels[r, c] == region and gap < best:
-                best, start = gap, (r - top) * width + (c - left)
+    start = (start // cols - top) * width + (start % cols - left)
     source = np.full(height * width, -1, dtype=np.int32)
     queue = np.empty(height * width, dtype=np.int32)
     source[start], queue[0] = start, start
@@ -317,12 +305,39 @@ def look_at(
         As there.
     """
     stands, around = np.full(regions.shape[0], -1, dtype=np.int64), np.empty(regions.shape[0], dtype=np.int64)
+    middles = _middles(labels, regions, windows, centres)
     for n in range(regions.shape[0]):
-        row, col = centres[n, 0], centres[n, 1]
         if bordered[n]:
-            stands[n] = stand_for(labels, regions[n], windows[n], row, col, open_, reached, range_blocks)
-        around[n] = unknown_around(labels, counted, row, col, range_blocks, regions[n])
+            stands[n] = stand_for(labels, regions[n], windows[n], middles[n], open_, reached, range_blocks)
+        around[n] = unknown_around(labels, counted, centres[n, 0], centres[n, 1], range_blocks, regions[n])
     return stands, around
+
+
+@kernel
+def _middles(labels: Labels, regions: IntArray, windows: IntArray, centres: NDArray[np.float64]) -> IntArray:
+    """Return of each region the block nearest to its centroid; those of one area stand together."""
+    middles = np.full(regions.shape[0], -1, dtype=np.int64)
+    gaps = np.full(regions.shape[0], np.inf)
+    first = 0
+    while first < regions.shape[0]:
+        window, last = windows[first], first + 1
+        while last < regions.shape[0] and (windows[last] == window).all():
+            last += 1
+        low = regions[first:last].min()
+        place = np.full(regions[first:last].max() - low + 1, -1, dtype=np.int64)
+        for n in range(first, last):
+            place[regions[n] - low] = n
+        for r in range(window[0], window[1]):
+            for c in range(window[2], window[3]):
+                at = labels[r, c] - low
+                if at < 0 or at >= place.shape[0] or place[at] < 0:
+                    continue
+                n = place[at]
+                gap = (r - centres[n, 0]) ** 2 + (c - centres[n, 1]) ** 2
+                if gap < gaps[n]:
+                    gaps[n], middles[n] = gap, r * labels.shape[1] + c
+        first = last
+    return middles
 
 
 @kernel
@@ -336,10 +351,12 @@ def provably_unseen(
     rows, cols = labels.shape
     for r in range(window[0], window[1]):
         for c in range(window[2], window[3]):
+            if labels[r, c] >= 0 and reached[r, c] and counted[labels[r, c]]:
+                return False
+    for r in range(window[0], window[1]):
+        for c in range(window[2], window[3]):
             if labels[r, c] < 0 or not counted[labels[r, c]]:
                 continue
-            if reached[r, c]:
-                return False
             for n in range(64):
                 angle = n * np.pi / 32.0
                 dr, dc = np.sin(angle), np.cos(angle)

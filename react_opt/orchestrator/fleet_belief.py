@@ -20,7 +20,7 @@ from react_opt.orchestrator.belief import AreaView, FloatArray, LocalTarget, Rob
 from react_opt.orchestrator.belief_areas import Areas
 from react_opt.orchestrator.belief_avoid import SLOWER, first_clear, with_gaps, without_discs
 from react_opt.orchestrator.belief_map import ROOM_M, BeliefMap, clear_at
-from react_opt.orchestrator.belief_paths import Field, Slowness, nearest_block, nearest_blocks, slowness
+from react_opt.orchestrator.belief_paths import Field, Ground, Slowness, nearest_block, nearest_blocks, slowness
 from react_opt.orchestrator.belief_regions import flood
 
 SNAP_M = 0.5
@@ -79,7 +79,7 @@ class FleetBelief:
         self._home: dict[str, tuple[float, float]] = {}
         self._reported = 0
         self._fresh = (-1, -1)
-        self._slow: dict[tuple[int, bool], Slowness] = {}
+        self._grounds: dict[tuple[int, bool], Ground] = {}
         self._fields: dict[tuple[int, bool, tuple[int, ...]], Field] = {}
         self._planned: tuple[int, tuple[str, ...]] = (-1, ())
         self._bodies_block = bodies_block
@@ -191,7 +191,7 @@ class FleetBelief:
         soonest = np.full(len(points), np.nan)
         for profile in dict.fromkeys(robot.profile for robot in robots):
             field = self._field_from([robot for robot in robots if robot.profile == profile], False)
-            soonest = np.fmin(soonest, self._times_s(field, self._blocks(self._slowness(profile, False), points)))
+            soonest = np.fmin(soonest, field.reached_s(self._blocks(self._slowness(profile, False), points)))
         return soonest
 
     def path(
@@ -206,10 +206,12 @@ class FleetBelief:
         if goal < 0:
             return ()
         field = self._field_from([robot], optimistic)
-        home = self._start(robot.profile, self._home.get(robot.id, (robot.x_m, robot.y_m)), optimistic)
         way = self._way(field, int(goal), robot)
-        if way or np.isfinite(field.times_s([home])[0]):
+        if way:
             return way
+        home = self._start(robot.profile, self._home.get(robot.id, (robot.x_m, robot.y_m)), optimistic)
+        if np.isfinite(field.times_s([home])[0]):
+            return ()
         tight = with_gaps(slow, self._map.clear, self._map.known > 0, robot.profile, self._map.frame.resolution_m)
         tight = without_discs(tight, self._discs(self._bodies(robot.profile)), 0.0)
         return self._way(self._search(tight, robot), int(goal), robot)
@@ -322,14 +324,17 @@ class FleetBelief:
         return nearest_blocks(slow, pixels, SNAP_M / self._side_m)
 
     def _slowness(self, profile: RobotProfile, optimistic: bool) -> Slowness:
+        return self._ground(profile, optimistic).slow
+
+    def _ground(self, profile: RobotProfile, optimistic: bool) -> Ground:
         self._forget()
         key = (self._profiles.index(profile), optimistic)
-        if key not in self._slow:
+        if key not in self._grounds:
             passable = self._map.passable(self._layer[profile], optimistic)
             slow = slowness(self._map.clear, passable, profile, self._map.frame.resolution_m)
             bodies = self._bodies(profile)
-            self._slow[key] = without_discs(slow, self._discs(bodies), 0.0) if bodies else slow
-        return self._slow[key]
+            self._grounds[key] = Ground(without_discs(slow, self._discs(bodies), 0.0) if bodies else slow)
+        return self._grounds[key]
 
     def _dead(self) -> list[RobotView]:
         return [robot for robot in self._robots.values() if robot.state == "dead" and self._bodies_block]
@@ -340,10 +345,10 @@ class FleetBelief:
         return [(robot.x_m, robot.y_m, reach + robot.profile.radius_m) for robot in self._dead()]
 
     def _field(self, profile: RobotProfile, starts: tuple[int, ...], optimistic: bool) -> Field:
-        slow = self._slowness(profile, optimistic)  # first of all: it forgets fields that are out of date
+        ground = self._ground(profile, optimistic)  # first of all: it forgets fields that are out of date
         key = (self._profiles.index(profile), optimistic, starts)
         if key not in self._fields:
-            self._fields[key] = Field(slow, starts, self._side_m, profile.speed_max_m_s)
+            self._fields[key] = Field(ground, starts, self._side_m, profile.speed_max_m_s)
         return self._fields[key]
 
     def _field_from(self, robots: Sequence[RobotView], optimistic: bool) -> Field:
@@ -355,7 +360,7 @@ class FleetBelief:
         """Search from the nearest block that is left to the robot, which may stand within a disc that is cut out."""
         (block,) = self._blocks(slow, [(robot.x_m, robot.y_m)])
         start = int(block) if block >= 0 else self._start(robot.profile, (robot.x_m, robot.y_m), False)
-        return Field(slow, (start,), self._side_m, robot.profile.speed_max_m_s)
+        return Field(Ground(slow), (start,), self._side_m, robot.profile.speed_max_m_s)
 
     def _way(self, field: Field, goal: int, robot: RobotView) -> tuple[tuple[float, float], ...]:
         """Return the way points of a field to a block, the robot's place first; empty where there is no way."""
@@ -377,7 +382,7 @@ class FleetBelief:
         if self._planned != facts:
             self._areas.fit()
             self._planned = (self._map.version, facts[1])  # fitting may have changed the map
-            self._slow.clear()
+            self._grounds.clear()
             self._fields.clear()
 
     def _read(
@@ -385,16 +390,8 @@ class FleetBelief:
     ) -> tuple[FloatArray, FloatArray]:
         """Return times and energies of a field at points."""
         blocks = self._blocks(self._slowness(profile, optimistic), points_m)
-        times = self._times_s(field, blocks)
+        times = field.reached_s(blocks)
         lengths = np.full(len(blocks), np.nan)
         there = np.isfinite(times)
         lengths[there] = field.lengths_m(blocks[there])
         return times, profile.drive_energy_j(lengths, times)
-
-    @staticmethod
-    def _times_s(field: Field, blocks: IntArray) -> FloatArray:
-        """Return times of a field at blocks (-1: at none), NaN where there is no way."""
-        times = np.full(len(blocks), np.nan)
-        times[blocks >= 0] = field.times_s(blocks[blocks >= 0])
-        times[np.isinf(times)] = np.nan
-        return times

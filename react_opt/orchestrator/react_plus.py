@@ -141,7 +141,8 @@ class ReactPlus:
             hidden = goal.blocks[inside][self.survey.hidden[rows[inside], cols[inside]] > 0]
             reach = self.regions.range_m / self.survey.block_m
             # what is hidden still but not in sight from the place to look from is no reason to go there
-            if count_seen(self.survey.blocks, *goal.view, hidden, COARSE, reach, 0.0) <= GONE * len(rows):
+            seen = count_seen(self.survey.blocks, self.survey.solids, *goal.view, hidden, COARSE, reach, 0.0)
+            if seen <= GONE * len(rows):
                 notes.append(Note("target_inspected", robot=robot.id, target=name))
                 return True
         return False

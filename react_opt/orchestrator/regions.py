@@ -214,7 +214,9 @@ class Regions:
         targets = hidden if len(hidden) else cluster.blocks
         reach = self.range_m / survey.block_m
         offsets = _offsets(survey.coarse_m)
-        row, col, seen = best_view(survey.blocks, time_s, may_stand, y, x, offsets, targets, COARSE, reach)
+        row, col, seen = best_view(
+            survey.blocks, survey.solids, time_s, may_stand, y, x, offsets, targets, COARSE, reach
+        )
         return ((row, col), seen / len(targets)) if seen else (None, 0.0)
 
 

@@ -202,7 +202,7 @@ def improve(
     dice = 24691
     for n in range(tries):
         trial[:count], still[:count] = points[:count], stays[:count]
-        now = count
+        now, moved = count, False
         dice = (dice * 1103515245 + 12345) % 2147483648
         kind = (dice >> 15) % 100
         dice = (dice * 1103515245 + 12345) % 2147483648
@@ -215,15 +215,17 @@ def improve(
         if kind < 30:
             if k < count - 1 and not still[k]:
                 now = _round(trial, still, count, k, 0.15 + 0.85 * two)
+                moved = now != count
         elif kind < 70:
             if not still[k]:
                 trial[k, 0] += reach * cos(2 * pi * two)
                 trial[k, 1] += reach * sin(2 * pi * two)
+                moved = True
         elif kind < 85:
             if not still[k]:
                 for m in range(k, count - 1):
                     trial[m], still[m] = trial[m + 1], still[m + 1]
-                now = count - 1
+                now, moved = count - 1, True
         elif count < trial.shape[0]:
             for m in range(count, k, -1):
                 trial[m], still[m] = trial[m - 1], still[m - 1]
@@ -231,7 +233,9 @@ def improve(
             trial[k, 0] += 0.5 * reach * cos(2 * pi * two)
             trial[k, 1] += 0.5 * reach * sin(2 * pi * two)
             still[k] = False
-            now = count + 1
+            now, moved = count + 1, True
+        if not moved:
+            continue  # there is nothing new to look at
         cost = drive_s(trial, now, heading, ground, law, room)
         if cost < best - 1e-4:
             best, count = cost, now

@@ -16,9 +16,10 @@ from scipy import ndimage
 
 from react_opt.energy import RobotProfile
 from react_opt.geometry.occupancy import OCCUPIED, OccupancyMap
-from react_opt.orchestrator.survey_drives import drive_times, nearest_passable, rimmed, way_is_free
+from react_opt.orchestrator.survey_drives import Ground, drive_times, ground_of, nearest_passable, way_is_free
 from react_opt.orchestrator.survey_kernels import (
     coarse_blocks,
+    count_solids,
     cut,
     newly_solid,
     stamp_clearance,
@@ -89,6 +90,7 @@ class Survey:
         self.coarse_m = COARSE * self.block_m
         reach_px = max(self.radius_m, self.profile.full_speed_clearance_m) / res
         self.blocks = survey_blocks(source.cells, self.k)
+        self.solids = count_solids(self.blocks)
         frame = (res, source.origin_x_m, source.origin_y_m, *map(float, source.cells.shape))
         new, kept = newly_solid(self._cells, source.cells) if frame == self._frame else (None, False)
         if new is None or not kept:
@@ -104,7 +106,7 @@ class Survey:
         sizes[0] = 0
         self.main = parts == np.argmax(sizes) if sizes.any() else self.may  # apart from islands among obstacles
         speed = self.profile.speed_m_s(clear_px * res, self.radius_m)
-        self._slow: dict[bool, FloatArray] = {}  # of this map, by whether unknown space counts as free
+        self._grounds: dict[bool, Ground] = {}  # of this map, by whether unknown space counts as free
         self.slowness = np.where(self.known, 1.0, self.hidden_slower) * self.coarse_m / speed
 
     # --- places ---
@@ -148,9 +150,9 @@ class Survey:
         """Return ``(rows, cols)`` s to every coarse block from the point from where it takes least."""
         blocks = [self._start(self.block_of(*point), optimistic) for point in points_m]
         starts = np.array([block for block in blocks if block is not None], dtype=np.int64).reshape(-1, 2)
-        if optimistic not in self._slow:
-            self._slow[optimistic] = rimmed(self.may if optimistic else self.known, self.slowness)
-        return np.asarray(drive_times(self._slow[optimistic], starts))
+        if optimistic not in self._grounds:
+            self._grounds[optimistic] = ground_of(self.may if optimistic else self.known, self.slowness)
+        return np.asarray(drive_times(self._grounds[optimistic], starts))
 
     def _start(self, block: Block, optimistic: bool) -> Block | None:
         """Return the coarse block that a drive starts from, further away where a robot is closed in."""

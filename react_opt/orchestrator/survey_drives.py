@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.kernels import kernel
 
+Grid = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -24,49 +27,81 @@ def nearest_passable(passable: Flags, row: int, col: int, reach: int) -> tuple[i
     return r_best, c_best
 
 
+class Ground(NamedTuple):
+    """What drives lead over, with a rim of one block around."""
+
+    slow: FloatArray
+    """What crossing a block costs, s; 0 in the rim and where nothing can pass."""
+    moves: Grid
+    """Which of :data:`MOVES` lead on from a block, one bit each."""
+    least: float
+    most: float
+    """The smallest and the largest cost where something can pass."""
+
+
+MOVES = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
+"""Rows and columns from a block to those around it."""
+
+
 @kernel
-def rimmed(passable: Flags, slowness: FloatArray) -> FloatArray:
-    """Return slowness with a rim of one block around, 0 in the rim and where nothing can pass."""
+def ground_of(passable: Flags, slowness: FloatArray) -> Ground:
+    """Return what drives lead over. A diagonal step needs one of the two blocks beside it."""
     rows, cols = passable.shape
-    out = np.zeros((rows + 2, cols + 2))
+    slow, moves = np.zeros((rows + 2, cols + 2)), np.zeros((rows + 2, cols + 2), dtype=np.uint8)
+    free = np.zeros((rows + 2, cols + 2), dtype=np.uint8)
+    least, most = np.inf, 0.0
     for r in range(rows):
         for c in range(cols):
             if passable[r, c]:
-                out[r + 1, c + 1] = slowness[r, c]
-    return out
+                slow[r + 1, c + 1], free[r + 1, c + 1] = slowness[r, c], 1
+                least, most = min(least, slowness[r, c]), max(most, slowness[r, c])
+    for r in range(1, rows + 1):
+        high, same, low, out = free[r - 1], free[r], free[r + 1], moves[r]
+        for c in range(1, cols + 1):
+            left, right = same[c - 1], same[c + 1]
+            out[c] = (
+                ((high[c] | left) & high[c - 1])
+                | (high[c] << 1)
+                | (((high[c] | right) & high[c + 1]) << 2)
+                | (left << 3)
+                | (right << 4)
+                | (((low[c] | left) & low[c - 1]) << 5)
+                | (low[c] << 6)
+                | (((low[c] | right) & low[c + 1]) << 7)
+            )
+    return Ground(slow, moves, least, most)
 
 
 @kernel
-def drive_times(slow: FloatArray, starts: IntArray) -> FloatArray:
+def drive_times(ground: Ground, starts: IntArray) -> FloatArray:
     """Return s to every block from the start that is nearest, over eight neighbours, infinite where there is no way.
 
-    Dijkstra's search with a ring of buckets as wide as the cheapest crossing: no order within a bucket matters. A
-    diagonal step needs one of the two blocks beside it.
+    Dijkstra's search with a ring of buckets as wide as the cheapest crossing: no order within a bucket matters.
 
     Parameters
     ----------
-    slow
-        What crossing a block costs, s, as of :func:`rimmed`.
+    ground
+        What the drives lead over.
     starts
         ``(n, 2)`` rows and columns, without the rim.
     """
-    cols, size = slow.shape[1], slow.size
-    cross = slow.reshape(-1)
-    least, most = np.inf, 0.0
-    for at in range(size):
-        if cross[at] > 0:
-            least, most = min(least, cross[at]), max(most, cross[at])
+    slow, moves = ground.slow.reshape(-1), ground.moves.reshape(-1)
+    cols, size = ground.slow.shape[1], ground.slow.size
+    steps, shares = np.empty(8, dtype=np.int64), np.empty(8)
+    for k in range(8):
+        steps[k] = MOVES[k][0] * cols + MOVES[k][1]
+        shares[k] = 0.7071067811865476 if MOVES[k][0] != 0 and MOVES[k][1] != 0 else 0.5
     cost = np.full(size, np.inf)
     done = np.zeros(size, dtype=np.bool_)
     mask = 1
-    while mask < int(1.5 * most / least) + 3:
+    while mask < int(1.5 * ground.most / ground.least) + 3:
         mask = 2 * mask + 1
     head = np.full(mask + 1, -1, dtype=np.int32)  # of lists of waiting blocks, linked both ways
     after, ahead = np.empty(size, dtype=np.int32), np.empty(size, dtype=np.int32)
     waiting, turn = 0, 0
     for n in range(starts.shape[0]):
         at = (starts[n, 0] + 1) * cols + starts[n, 1] + 1
-        if cross[at] > 0 and cost[at] > 0:
+        if slow[at] > 0 and cost[at] > 0:
             cost[at], after[at], ahead[at] = 0.0, head[0], -1
             if head[0] >= 0:
                 ahead[head[0]] = at
@@ -83,37 +118,32 @@ def drive_times(slow: FloatArray, starts: IntArray) -> FloatArray:
             ahead[low] = -1
         waiting -= 1
         done[here] = True
-        left, right = cross[here - 1] > 0, cross[here + 1] > 0
-        for dr in range(-1, 2):
-            middle = here + dr * cols
-            straight = cross[middle] > 0
-            for dc in range(-1, 2):
-                there = middle + dc
-                if cross[there] <= 0 or (dr != 0 and dc != 0 and not (straight or (left if dc < 0 else right))):
-                    continue
-                step = 0.7071067811865476 if dr != 0 and dc != 0 else 0.5
-                reached = cost[here] + step * (cross[here] + cross[there])
-                known = cost[there]
-                if reached >= known or done[there]:
-                    continue
-                if known < np.inf:
-                    low, high = after[there], ahead[there]
-                    if high >= 0:
-                        after[high] = low
-                    else:
-                        head[int(known / least) & mask] = low
-                    if low >= 0:
-                        ahead[low] = high
+        for k in range(8):
+            if not (moves[here] >> k) & 1:
+                continue
+            there = here + steps[k]
+            reached = cost[here] + shares[k] * (slow[here] + slow[there])
+            known = cost[there]
+            if reached >= known or done[there]:
+                continue
+            if known < np.inf:  # take it out of its bucket
+                low, high = after[there], ahead[there]
+                if high >= 0:
+                    after[high] = low
                 else:
-                    waiting += 1
-                cost[there] = reached
-                slot = int(reached / least) & mask
-                low = head[slot]
-                after[there], ahead[there] = low, -1
+                    head[int(known / ground.least) & mask] = low
                 if low >= 0:
-                    ahead[low] = there
-                head[slot] = there
-    return cost.reshape(slow.shape)[1:-1, 1:-1].copy()
+                    ahead[low] = high
+            else:
+                waiting += 1
+            cost[there] = reached
+            slot = int(reached / ground.least) & mask
+            low = head[slot]
+            after[there], ahead[there] = low, -1
+            if low >= 0:
+                ahead[low] = there
+            head[slot] = there
+    return cost.reshape(ground.slow.shape)[1:-1, 1:-1].copy()
 
 
 @kernel

@@ -55,6 +55,19 @@ def survey_blocks(cells: Grid, k: int) -> Grid:
 
 
 @kernel
+def count_solids(blocks: Grid) -> NDArray[np.int32]:
+    """Return ``(rows + 1, cols + 1)`` how many solid blocks there are in all rows and columns before each."""
+    rows, cols = blocks.shape
+    solids = np.zeros((rows + 1, cols + 1), dtype=np.int32)
+    for r in range(rows):
+        row = 0
+        for c in range(cols):
+            row += blocks[r, c] == SOLID
+            solids[r + 1, c + 1] = solids[r, c + 1] + row
+    return solids
+
+
+@kernel
 def newly_solid(before: Grid, now: Grid) -> tuple[IntArray, bool]:
     """Return ``(n, 2)`` rows and columns of the pixels that have become occupied, and whether none ceased to be."""
     found = np.empty((now.size, 2), dtype=np.int64)

@@ -12,6 +12,7 @@ from react_opt.orchestrator.survey_kernels import SOLID
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Grid = NDArray[np.uint8]
+Counts = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
 ENOUGH = 0.75
@@ -23,6 +24,7 @@ NEAREST_BLOCKS = 8
 @kernel
 def best_view(
     blocks: Grid,
+    solids: Counts,
     time_s: FloatArray,
     may_stand: Flags,
     row: float,
@@ -36,8 +38,9 @@ def best_view(
 
     Parameters
     ----------
-    blocks
-        What there is, as of :func:`react_opt.orchestrator.survey_kernels.survey_blocks`.
+    blocks, solids
+        What there is, and how many solid ones there are before each, as of ``survey_blocks`` and ``count_solids`` in
+        :mod:`react_opt.orchestrator.survey_kernels`.
     time_s, may_stand
         ``(rows, cols)`` s to each coarse block, and whether it is a place to look from (all those can be reached).
     row, col, offsets
@@ -60,7 +63,7 @@ def best_view(
         time = time_s[places[n, 0], places[n, 1]]
         if most == targets.shape[0] and time >= soonest:
             continue  # one that sees all will do, and is there sooner
-        seen[n] = count_seen(blocks, places[n, 0], places[n, 1], targets, coarse, reach, ENOUGH * most)
+        seen[n] = count_seen(blocks, solids, places[n, 0], places[n, 1], targets, coarse, reach, ENOUGH * most)
         if seen[n] > most:
             most, soonest = seen[n], np.inf
             for k in range(n + 1):
@@ -85,15 +88,17 @@ def _with_place(places: IntArray, count: int, r: int, c: int) -> int:
 
 
 @kernel
-def count_seen(blocks: Grid, row: int, col: int, targets: IntArray, coarse: int, reach: float, least: float) -> int:
+def count_seen(
+    blocks: Grid, solids: Counts, row: int, col: int, targets: IntArray, coarse: int, reach: float, least: float
+) -> int:
     """Return how many of some coarse blocks are in line of sight of one, hidden blocks being clear.
 
     A line is looked at in as many steps as it is blocks long.
 
     Parameters
     ----------
-    blocks
-        What there is.
+    blocks, solids
+        What there is, as of :func:`best_view`.
     row, col, targets
         The coarse block to look from, and ``(n, 2)`` rows and columns of those to look at.
     coarse
@@ -110,9 +115,14 @@ def count_seen(blocks: Grid, row: int, col: int, targets: IntArray, coarse: int,
     for k in range(targets.shape[0]):
         if seen + targets.shape[0] - k < least:
             break
-        dy, dx = targets[k, 0] * coarse + coarse // 2 - y0, targets[k, 1] * coarse + coarse // 2 - x0
+        y1, x1 = targets[k, 0] * coarse + coarse // 2, targets[k, 1] * coarse + coarse // 2
+        dy, dx = y1 - y0, x1 - x0
         gap = np.sqrt(float(dx * dx + dy * dy))
         if gap > reach:
+            continue
+        low, high, left, right = min(y0, y1), max(y0, y1) + 1, min(x0, x1), max(x0, x1) + 1
+        if solids[high, right] - solids[low, right] - solids[high, left] + solids[low, left] == 0:
+            seen += 1  # there is nothing solid anywhere between them
             continue
         pieces = int(gap) + 1
         # what a step leaves of a whole block is carried over, in pieces; backwards, blocks end at their other side

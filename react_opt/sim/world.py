@@ -14,6 +14,7 @@ from react_opt.geometry.raycast import ray_table, sees_any_px
 from react_opt.kernels import kernel
 
 _LOOKS = 720  # directions in which a pixel looks for a place to be seen from
+_APART = 271  # one after the other is so many directions further; no divisor in common with their number
 
 
 class World:
@@ -64,7 +65,8 @@ class World:
         """Free pixels that a LiDAR sees from some place that a robot reaches."""
         seen = np.zeros(self.blocked.shape, dtype=np.bool_)
         range_px = range_m / self.map.resolution_m
-        _mark_coverable(self.blocked, np.ascontiguousarray(self.drivable), ray_table(_LOOKS), range_px, seen)
+        table = ray_table(_LOOKS)[np.arange(_LOOKS) * _APART % _LOOKS]  # all around first, then in between
+        _mark_coverable(self.blocked, np.ascontiguousarray(self.drivable), table, range_px, seen)
         return seen
 
     def extent_m(self, cell_m: float) -> tuple[float, float, float, float]:

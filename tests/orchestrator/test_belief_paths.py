@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from react_opt.orchestrator.belief_paths import Field
+from react_opt.orchestrator.belief_paths import Field, Ground
 
 SHAPE = (30, 40)
 SIDE_M = 0.1
@@ -26,7 +26,7 @@ def drawn(seed: int) -> NDArray[np.float32]:
 
 
 def field_of(slow: NDArray[np.float32], *starts: int) -> Field:
-    return Field(slow, starts, SIDE_M, 1.0)
+    return Field(Ground(slow), starts, SIDE_M, 1.0)
 
 
 @pytest.mark.parametrize("seed", range(4))

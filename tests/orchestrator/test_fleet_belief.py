@@ -202,6 +202,31 @@ def test_layers_kept_up_to_date_are_those_worked_out_at_once(seed: int) -> None:
     assert np.array_equal(slow.map.cells, fast.map.cells)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_targets_found_step_by_step_are_those_found_at_once(seed: int) -> None:
+    """But for their names: the same regions, looked at from the same places."""
+    rng = np.random.default_rng(seed)
+    cells = truth_of().cells.copy()
+    for _ in range(15):
+        r, c = rng.integers(2, 90), rng.integers(2, 190)
+        cells[r : r + rng.integers(1, 14), c : c + rng.integers(1, 14)] = 1
+    cells[46:55, 16:25] = 0
+    unknown = ndimage.gaussian_filter(rng.random(cells.shape), 5) > 0.5
+    unknown[40:60, 10:40] = False
+    slow, fast = belief_of(truth_of(), cell_m=5.0), belief_of(truth_of(), cell_m=5.0)
+    for belief in (slow, fast):
+        belief.report(robot_at(2.05, 5.05))
+    rows, cols = np.nonzero(~unknown)
+    for part in np.array_split(rng.permutation(len(rows)), 6):
+        slow.merge(1.0, rows[part], cols[part], cells[rows[part], cols[part]])
+        _ = slow.targets
+    fast.merge(1.0, rows, cols, cells[rows, cols])
+    found = [sorted(repr(dataclasses.replace(target, id="")) for target in one.targets) for one in (slow, fast)]
+    assert found[0] == found[1]
+    assert sum(target.stand_m is not None for target in fast.targets) > 2
+    assert [area.stand_m for area in slow.areas] == [area.stand_m for area in fast.areas]
+
+
 def test_the_soonest_of_robots_is_there_first_on_every_map() -> None:
     """Two kinds of robots, asked anew after each change: the least of their own times, as of a belief made anew."""
     slim = dataclasses.replace(PROFILE, length_m=0.3, width_m=0.2, speed_max_m_s=0.6)

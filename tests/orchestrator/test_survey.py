@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from react_opt.geometry.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from react_opt.orchestrator.survey import COARSE, Survey
-from react_opt.orchestrator.survey_drives import drive_times, rimmed, ways_out
+from react_opt.orchestrator.survey_drives import drive_times, ground_of, ways_out
+from react_opt.orchestrator.survey_kernels import count_solids
 from react_opt.orchestrator.views import count_seen
 
 from .drawn import PROFILE
@@ -41,7 +42,7 @@ def test_drive_times_are_those_of_plain_dijkstra(seed: int) -> None:
     i, j, w = np.array(edges).T
     graph = coo_array((w, (i.astype(int), j.astype(int))), shape=(rows * cols, rows * cols)).tocsr()
     expected = dijkstra(graph, indices=3 * cols + 4).reshape(rows, cols)
-    np.testing.assert_allclose(drive_times(rimmed(passable, slowness), np.array([[3, 4]])), expected, rtol=1e-12)
+    np.testing.assert_allclose(drive_times(ground_of(passable, slowness), np.array([[3, 4]])), expected, rtol=1e-12)
 
 
 def test_times_from_several_points_are_those_from_the_nearest() -> None:
@@ -63,7 +64,7 @@ def test_updates_give_what_a_new_survey_of_the_last_map_gives() -> None:
         cells[rng.integers(0, 60, 20), rng.integers(0, 50, 20)] = OCCUPIED
         survey_of(cells.copy(), survey, version)
     fresh = survey_of(cells)
-    for name in ("blocks", "known", "may", "border", "hidden", "best", "slowness"):
+    for name in ("blocks", "known", "may", "border", "hidden", "best", "slowness", "solids"):
         np.testing.assert_array_equal(getattr(survey, name), getattr(fresh, name), err_msg=name)
 
 
@@ -89,8 +90,8 @@ def test_what_stands_behind_a_wall_is_not_seen() -> None:
     blocks = np.zeros((20, 20), dtype=np.uint8)
     blocks[:15, 10] = OCCUPIED  # a wall with an opening above
     targets = np.array([[2, 8], [9, 8]])  # coarse blocks: below, and level with the opening
-    assert count_seen(blocks, 2, 2, targets, COARSE, 40.0, 0.0) == 0
-    assert count_seen(blocks, 9, 2, targets, COARSE, 40.0, 0.0) == 1
+    assert count_seen(blocks, count_solids(blocks), 2, 2, targets, COARSE, 40.0, 0.0) == 0
+    assert count_seen(blocks, count_solids(blocks), 9, 2, targets, COARSE, 40.0, 0.0) == 1
 
 
 def test_a_gap_narrower_than_the_robot_is_no_way() -> None:
@@ -107,7 +108,7 @@ def test_the_way_out_leads_around_a_wall_and_a_near_place_is_its_own() -> None:
     """From (4, 1) the place (4, 5) lies behind a wall that is open at the lower end alone: one sets out downwards."""
     passable = np.ones((7, 7), dtype=bool)
     passable[1:, 3] = False
-    cost = drive_times(rimmed(passable, np.ones(passable.shape)), np.array([[4, 1]]))
+    cost = drive_times(ground_of(passable, np.ones(passable.shape)), np.array([[4, 1]]))
     places = np.array([[4, 5], [4, 2], [6, 3]])
     out = ways_out(cost, places, 2.0)
     assert out[0].tolist() == [2, 1] or out[0].tolist() == [2, 2]

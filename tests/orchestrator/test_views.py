@@ -7,6 +7,7 @@ import pytest
 
 from react_opt.geometry.occupancy import OCCUPIED
 from react_opt.orchestrator.survey import COARSE
+from react_opt.orchestrator.survey_kernels import count_solids
 from react_opt.orchestrator.views import ENOUGH, NEAREST_BLOCKS, best_view, count_seen
 
 REACH = 24.0
@@ -40,7 +41,7 @@ def test_the_soonest_place_that_sees_enough_is_chosen(seed: int) -> None:
     seen = [looked(blocks, place, targets) for place in places]
     good = [n for n in range(len(places)) if seen[n] >= ENOUGH * max(seen)]
     best = min(good, key=lambda n: float(time_s[places[n]]))
-    found = best_view(blocks, time_s, stand, row, col, offsets, targets, COARSE, REACH)
+    found = best_view(blocks, count_solids(blocks), time_s, stand, row, col, offsets, targets, COARSE, REACH)
     assert found == (*places[best], seen[best])
 
 
@@ -48,14 +49,22 @@ def test_where_nothing_is_seen_or_nobody_can_stand_there_is_no_view() -> None:
     blocks, time_s = np.zeros((20, 20), dtype=np.uint8), np.zeros((10, 10))
     targets, offsets = np.array([[8, 8]]), np.zeros((1, 2))
     view = (offsets, targets, COARSE, 4.0)
-    assert best_view(blocks, time_s, np.ones((10, 10), dtype=bool), 1.0, 1.0, *view) == (-1, -1, 0), "too far away"
-    assert best_view(blocks, time_s, np.zeros((10, 10), dtype=bool), 8.0, 8.0, *view) == (-1, -1, 0)
+    assert best_view(blocks, count_solids(blocks), time_s, np.ones((10, 10), dtype=bool), 1.0, 1.0, *view) == (
+        -1,
+        -1,
+        0,
+    ), "too far away"
+    assert best_view(blocks, count_solids(blocks), time_s, np.zeros((10, 10), dtype=bool), 8.0, 8.0, *view) == (
+        -1,
+        -1,
+        0,
+    )
 
 
 def test_a_count_ends_where_it_cannot_be_enough_any_more() -> None:
     blocks = np.zeros((20, 20), dtype=np.uint8)
     blocks[8:10] = OCCUPIED
     targets = np.array([[7, 1], [7, 2], [1, 1], [1, 2], [1, 3]])
-    assert count_seen(blocks, 2, 2, targets, COARSE, 40.0, 0.0) == 3
-    assert count_seen(blocks, 2, 2, targets, COARSE, 40.0, 3.0) == 3
-    assert count_seen(blocks, 2, 2, targets, COARSE, 40.0, 4.0) < 4
+    assert count_seen(blocks, count_solids(blocks), 2, 2, targets, COARSE, 40.0, 0.0) == 3
+    assert count_seen(blocks, count_solids(blocks), 2, 2, targets, COARSE, 40.0, 3.0) == 3
+    assert count_seen(blocks, count_solids(blocks), 2, 2, targets, COARSE, 40.0, 4.0) < 4
