@@ -32,8 +32,10 @@ from react_opt.certify_bound_route import (
     rests_of,
     sensed,
 )
+from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance, OrosRobot
 
+MOST_BEGINNINGS = 50_000_000  # of routes; some minutes
 REMEMBERED = 8  # cells that the rest of a route remembers at each place, for a bound on it
 
 
@@ -78,6 +80,11 @@ def worthwhile_routes(
         Price of a joule at which the battery is relaxed besides.
     first, last_of
         ``(n_cells,)`` instants between which it may collect each cell.
+
+    Raises
+    ------
+    UsageError
+        If there are more beginnings of routes than can be held.
     """
     n, last = len(instance.cells), instance.horizon_steps
     index = {cell.id: i for i, cell in enumerate(instance.cells)}
@@ -100,6 +107,7 @@ def worthwhile_routes(
     nowhere = _Partial(np.zeros((1, words), np.uint64), zero, zero, none, zero)
     waiting[robot.start_step][index[robot.start]] = [nowhere]
     ended = [_ended(nowhere, instance.sigma, float(least_j[robot.start_step, index[robot.start]]), budget, floor)]
+    known = 0
     for t in range(robot.start_step, last + 1):
         for i, parts in waiting[t].items():
             here = _Partial(*(np.concatenate(column) for column in zip(*parts, strict=True)))
@@ -114,6 +122,12 @@ def worthwhile_routes(
             here = _Partial(*(np.concatenate(pair) for pair in zip(here, twins, strict=True)))
             here = _one_per_set(here, limited)
             here = _take(here, here.used_j <= budget)
+            known += len(here.worth)
+            if known > MOST_BEGINNINGS:
+                raise UsageError(
+                    f"the certificate rests on routes with more than {MOST_BEGINNINGS} beginnings: too many to be "
+                    "enumerated again"
+                )
             if len(here.worth) == 0 or t == last:
                 continue
             idle = moves.idle_j

@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from react_opt import certify_bound_enumerate
 from react_opt.certify_bound import recompute_bound
 from react_opt.certify_bound_choice import repriced
 from react_opt.certify_bound_enumerate import Found
@@ -171,6 +172,20 @@ def test_a_bound_that_rests_on_enumeration_is_recomputed(monkeypatch: pytest.Mon
             forged = {**proof, "classes": [{**group, "best": group["best"] - 3.0} for group in proof["classes"]]}
             assert recompute_bound(instance, forged) >= best - 1e-9 * best
     assert enumerated >= 3
+
+
+def test_an_enumeration_that_is_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A line that says so, rather than a machine without memory."""
+    monkeypatch.setattr(Tightening, "tighten", lambda self: False)
+    monkeypatch.setattr(certify_bound_enumerate, "MOST_BEGINNINGS", 20)
+    for seed in range(20):
+        instance = _instance(seed, 5000.0)
+        proof = solve_routes(route_problem(instance), work_limit=2000).certificate
+        if proof.get("enumerated", False):
+            with pytest.raises(UsageError, match="more than 20 beginnings"):
+                recompute_bound(instance, proof)
+            return
+    pytest.fail("no bound rests on an enumeration")
 
 
 def test_prices_over_enumerated_routes_are_recomputed(monkeypatch: pytest.MonkeyPatch) -> None:
