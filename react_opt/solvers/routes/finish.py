@@ -84,7 +84,8 @@ class Finish:
         if gap > self._hopeless_gap and not anew:
             return None
         pricer, floor = self.generation.pricer, standing.objective
-        most = min(MOST, max(LEAST, 2 * pricer.labels))
+        words = -(-pricer.problem.n_cells // 64)
+        most = min(MOST, max(LEAST, 2 * pricer.labels)) // max(1, words // 2)  # sets of many cells are large
         duals = self.generation.extended(best)
         found: list[Enumeration] = []
         for group in range(len(master.counts)):
