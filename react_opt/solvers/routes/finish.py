@@ -204,7 +204,8 @@ class Finish:
         bound = float(prices.cell.sum()) + float(prices.price @ rhs) + float(counts @ best)
         prices = replace(prices, bound=bound, group=best)
         gap = self._gap(prices)
-        whole = all(look.whole_above <= top - gap for look, top in zip(looks, best.tolist(), strict=True))
+        rounding = 1e-8 * max(1.0, abs(bound))  # a tenth of the margin that the gap holds
+        whole = all(look.whole_above <= top - gap + rounding for look, top in zip(looks, best.tolist(), strict=True))
         loss = np.concatenate([top - look.reduced for look, top in zip(looks, best.tolist(), strict=True)])
         group = np.concatenate([np.full(len(look.value), k, np.int64) for k, look in enumerate(looks)])
         value, sets = np.concatenate([look.value for look in looks]), np.concatenate([look.sets for look in looks])
