@@ -199,7 +199,7 @@ def main() -> None:
         "group   cells robots    T battery seed solver  status       objective        bound       gap   time_s limit_s"
     )
     ratios: dict[str, list[float]] = {name: [] for name in [*options.peers, "best peer"]}
-    most_cells = options.most_cells or math.inf
+    most_cells = math.inf if options.most_cells is None else options.most_cells
     rows = [row for row in TABLE if row.group in options.groups and row.cells <= most_cells]
     for row, seed in ((row, seed) for row in rows for seed in seeds_of(options.seeds)):
         limit_s = options.limit_s or row.limit_s
