@@ -25,8 +25,10 @@ from react_opt.errors import UsageError
 from react_opt.instance import OrosInstance
 from react_opt.models.replay import value
 from react_opt.solvers.monolith import solve_monolith
+from react_opt.solvers.oros import solve_oros
 from react_opt.solvers.outcome import Request
 from react_opt.solvers.routes.engine import solve_routes
+from react_opt.solvers.warm import warm_up
 from react_opt.timegraph import route_problem
 
 PEERS = ["highs", "cp-sat", "scip"]
@@ -185,14 +187,10 @@ def main() -> None:
     parser.add_argument("--limit-s", type=float, help="limit of every solver instead of the row's target")
     parser.add_argument("--results", metavar="FILE.jsonl", help="keep each run here, and skip those that are there")
     options = parser.parse_args()
-    results, warm = Results(options.results), False
+    results = Results(options.results)
 
     def own_outcome(row: Row, seed: int, limit_s: float) -> Outcome:
-        nonlocal warm
-        if not warm:  # compile, or load from the cache, what is compiled
-            for battery in (1.0, 0.5):
-                decomposed(Row("warm", 3, 4, 2, 12, 60.0, battery), 0, options.threads, 60.0)
-            warm = True
+        warm_up("oros", solve_oros)
         return decomposed(row, seed, options.threads, limit_s)
 
     print(

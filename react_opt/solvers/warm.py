@@ -78,7 +78,7 @@ def _enumerate(instance: OrosInstance) -> None:
     look = found.look(set_prices(duals.cell, (), none), 0.0, 1000)
     best_of_each(look.sets, look.value)  # where there are threads
     pool = Pool(look.value, np.zeros(len(look.value)), np.zeros(len(look.value), np.int64), look.sets)
-    separate_sets(np.eye(6, dtype=np.uint8), np.ones(6), set(), 1)
+    separate_sets(1 - np.eye(6, dtype=np.uint8), np.full(6, 0.3), set(), 1)  # cells in common: sets grow to all sizes
     best_choice(pool, np.ones(1, np.int64), np.zeros(problem.n_cells), 1.0, 0.0, 1, pricer.stop)
 
 

@@ -30,8 +30,9 @@ assert sum(count > 0 for count in before.values()) > 10, before
 instances = [drawn(option, 1) for option in OPTIONS]
 instances += [parse(FAMILIES[name].make(seed=0, **FAMILIES[name].sizes["tiny"])) for name in ("tight_grid", "chargers")]
 instances.append(parse(FAMILIES["walled_grid"].make(seed=0, rows=5, cols=10, robots=2, horizon=90)))
+instances.append(parse(FAMILIES["walled_grid"].make(seed=0, rows=6, cols=10, robots=3, horizon=32)))
 for instance in instances:
-    solve(instance, method="routes", threads=1, work_limit=30)
+    solve(instance, method="routes", threads=1, work_limit=30 if len(instance.cells) < 60 else None)
 fresh = {name for name, count in compiled().items() if count != before.get(name, 0)}
 print(*sorted(fresh))
 """
