@@ -12,6 +12,7 @@ before the next one.
   passing is no target any more. Crumbs are left until nothing else is.
 * Robots are led through the next few places of their tours on ways that are quick to drive
   (:mod:`react_opt.orchestrator.guide`, :mod:`react_opt.orchestrator.smooth`).
+* The regions of a robot that does not get on go to the others (:mod:`react_opt.orchestrator.setbacks`).
 
 The plan is made anew whenever a target has been seen, a robot stands, and every few seconds.
 """
@@ -25,6 +26,7 @@ from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
 from react_opt.orchestrator.guide import Guide
 from react_opt.orchestrator.orders import able
 from react_opt.orchestrator.regions import HiddenSpace, Region, Regions
+from react_opt.orchestrator.setbacks import Setbacks
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
 from react_opt.orchestrator.survey import COARSE, Block, Survey
 from react_opt.orchestrator.survey_drives import ways_out
@@ -65,8 +67,6 @@ GONE = 0.25
 SEEN_M, PASSED_M = 0.6, 0.25
 STOPS = 3
 """An order leads through so many regions at most."""
-GIVE_UP_M = 1.0
-STUCK_S = 30.0
 
 
 class ReactPlus:
@@ -82,7 +82,7 @@ class ReactPlus:
         self.was_at: dict[str, tuple[float, float]] = {}
         self.names: dict[str, str] = {}
         self.tours: list[list[tuple[float, float]]] = []
-        self.given_up: list[tuple[float, float, float]] = []
+        self.setbacks = Setbacks()
         self.looked: list[tuple[float, float]] = []
         self.fields: dict[Block, tuple[float, FloatArray]] = {}
         self.serial = 0
@@ -130,7 +130,8 @@ class ReactPlus:
                 if near:
                     self.looked.append(goal.view_m)
                 else:
-                    self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
+                    self.setbacks.give_up(robot, goal.at_m, belief.t_s)
+                    self.setbacks.stuck(robot)
                 why = "looked at; what is left is seen from elsewhere" if near else "no progress"
                 notes.append(Note("target_abandoned", robot=robot.id, target=name, reason=why))
             return True
@@ -154,20 +155,19 @@ class ReactPlus:
         assert self.regions is not None
         self.planned_s = belief.t_s
         fields = np.array([self.survey.times_from(robot.x_m, robot.y_m, optimistic=True) for robot in robots])
-        self.given_up = [row for row in self.given_up if row[2] > belief.t_s]
-        found = [
-            region
-            for region in self.regions.find(self.survey, belief.areas, fields.min(axis=0), self.looked)
-            if not any(np.hypot(region.at_m[0] - x, region.at_m[1] - y) < GIVE_UP_M for x, y, _ in self.given_up)
-        ]
+        self.setbacks.forget(robots, belief.t_s)
+        found = self.regions.find(self.survey, belief.areas, fields.min(axis=0), self.looked)
+        out = self.setbacks.out_of_reach(robots, [region.at_m for region in found])
+        found = [region for k, region in enumerate(found) if not out[:, k].all()]
         found = [region for region in found if region.value_m2 >= CRUMB_M2] or found
         found = sorted(found, key=lambda region: -region.value_m2)[:MOST_TARGETS]
         self.over = not found
         if not found:
             self.goals, self.tours = {}, []
             return
-        start_s = self._starts(robots, fields, found) + SERVICE_S
-        start_s[~np.isfinite(start_s)] = FAR_S
+        start_s = self._starts(robots, fields, found) + SERVICE_S + self.setbacks.delay_s(robots)[:, None]
+        out = self.setbacks.out_of_reach(robots, [region.at_m for region in found])
+        start_s[out | ~np.isfinite(start_s)] = FAR_S
         between_s = self._between(belief.t_s, found)
         value = np.array([region.value_m2 for region in found])
         known_m2 = float(np.count_nonzero(self.survey.blocks == OPEN)) * self.survey.block_m**2
@@ -180,9 +180,9 @@ class ReactPlus:
         order, _ = plan_tours(insert_all(begin, missing, *facts), *facts, WORK)
         tours = _split(order)
         self.tours = [[found[k].at_m for k in tour] for tour in tours]
-        for robot, tour in zip(robots, tours, strict=True):
+        for n, (robot, tour) in enumerate(zip(robots, tours, strict=True)):
             self.then[robot.id] = [found[k] for k in tour[1:STOPS]]
-            self._take(robot, found[tour[0]] if tour else None, notes)
+            self._take(robot, found[tour[0]] if tour and not out[n, tour[0]] else None, notes)
         self.goals = {name: goal for name, goal in self.goals.items() if name in {robot.id for robot in robots}}
 
     def _starts(self, robots: list[RobotView], fields: FloatArray, found: list[Region]) -> FloatArray:
@@ -302,7 +302,7 @@ class ReactPlus:
         stops = self._stops(robot, goal, area_of, explored)
         orders = self.guide.go(belief, self.survey, robot, self.names[robot.id], stops)
         if orders is None:
-            self.given_up.append((*goal.at_m, belief.t_s + STUCK_S))
+            self.setbacks.give_up(robot, goal.at_m, belief.t_s)
             del self.goals[robot.id]
         return orders
 

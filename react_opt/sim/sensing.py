@@ -5,14 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from react_opt.geometry.occupancy import UNKNOWN
 from react_opt.geometry.raycast import ray_table, scan_px, unknown_ahead_px
 from react_opt.instance import Mission
+from react_opt.kernels import kernel
 from react_opt.orchestrator.fleet_belief import FleetBelief
 from react_opt.sim.robot import SimRobot
+from react_opt.sim.rules import sampled
 from react_opt.sim.world import World
 
 SMALL_GAIN_M2 = 0.1
 """Below this much new area per scan the rule ``small_gain`` switches off, m^2."""
+
+BLIND_M = 1.0
+"""No robot drives over ground that it has not seen with its sensors off: they are on so far before it, m."""
+
+_SAMPLE_M = 0.1
 
 
 class Lidars:
@@ -38,9 +46,10 @@ class Lidars:
 
         ``no_new_pixel`` and ``small_gain`` ask what a scan would reveal if unknown space were free;
         ``area_explored`` whether the robot's area is explored (share ``delta``), unless its way ends there at
-        something smaller than an area: a local target, a frontier.
+        something smaller than an area: a local target, a frontier. Whatever the rule and the order, sensors are on
+        where a robot is about to drive over ground that it does not know, and where it cannot move as it wants.
         """
-        if self._mission.always_on:
+        if self._mission.always_on or robot.wedged or self._is_blind(robot, known):
             return True
         if robot.order is not None and not robot.order.sensing:
             return False
@@ -57,6 +66,14 @@ class Lidars:
         table, reach = ray_table(robot.profile.lidar_rays), robot.profile.lidar_range_m / unit
         return bool(unknown_ahead_px(known, x, y, c, s, table, reach, self._marks, self._mark, enough) >= enough)
 
+    def _is_blind(self, robot: SimRobot, known: NDArray[np.uint8]) -> bool:
+        """Tell whether a robot's disc is about to cover pixels that it does not know."""
+        if not robot.path:
+            return False
+        unit = self._world.map.resolution_m
+        ahead = sampled([(robot.u_m, robot.v_m), *robot.path], _SAMPLE_M, BLIND_M)
+        return bool(_covers_unknown(known, ahead / unit, robot.profile.radius_m / unit))
+
     @staticmethod
     def _inspects(robot: SimRobot, belief: FleetBelief) -> str | None:
         """Return the area in which a robot's order leads it to look at something smaller than an area."""
@@ -71,3 +88,16 @@ class Lidars:
         table, reach = ray_table(robot.profile.lidar_rays), robot.profile.lidar_range_m / unit
         count = scan_px(self._world.map.cells, known, x, y, c, s, table, reach, self._found)
         return self._found[:count].copy()
+
+
+@kernel
+def _covers_unknown(known: NDArray[np.uint8], points: NDArray[np.float64], radius: float) -> bool:
+    """Tell whether a disc around any of some points (pixel coordinates) covers the centre of an unknown pixel."""
+    rows, cols = known.shape
+    for n in range(points.shape[0]):
+        x, y = points[n, 0], points[n, 1]
+        for r in range(max(0, int(y - radius)), min(rows, int(y + radius) + 1)):
+            for c in range(max(0, int(x - radius)), min(cols, int(x + radius) + 1)):
+                if known[r, c] == UNKNOWN and (c + 0.5 - x) ** 2 + (r + 0.5 - y) ** 2 < radius * radius:
+                    return True
+    return False
