@@ -108,14 +108,16 @@ def count_seen(
     least
         Fewer than this are as good as none: the count may end as soon as they cannot be reached.
     """
-    cols = blocks.shape[1]
+    rows, cols = blocks.shape
     flat = blocks.reshape(-1)
-    y0, x0 = row * coarse + coarse // 2, col * coarse + coarse // 2
+    # the middle of a coarse block at the far edges of the map may lie beyond the last block
+    y0, x0 = min(row * coarse + coarse // 2, rows - 1), min(col * coarse + coarse // 2, cols - 1)
     seen = 0
     for k in range(targets.shape[0]):
         if seen + targets.shape[0] - k < least:
             break
-        y1, x1 = targets[k, 0] * coarse + coarse // 2, targets[k, 1] * coarse + coarse // 2
+        y1 = min(targets[k, 0] * coarse + coarse // 2, rows - 1)
+        x1 = min(targets[k, 1] * coarse + coarse // 2, cols - 1)
         dy, dx = y1 - y0, x1 - x0
         gap = np.sqrt(float(dx * dx + dy * dy))
         if gap > reach:

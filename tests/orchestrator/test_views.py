@@ -7,7 +7,7 @@ import pytest
 
 from react_opt.geometry.occupancy import OCCUPIED
 from react_opt.orchestrator.survey import COARSE
-from react_opt.orchestrator.survey_kernels import count_solids
+from react_opt.orchestrator.survey_kernels import OPEN, SOLID, count_solids
 from react_opt.orchestrator.views import ENOUGH, NEAREST_BLOCKS, best_view, count_seen
 
 REACH = 24.0
@@ -68,3 +68,16 @@ def test_a_count_ends_where_it_cannot_be_enough_any_more() -> None:
     assert count_seen(blocks, count_solids(blocks), 2, 2, targets, COARSE, 40.0, 0.0) == 3
     assert count_seen(blocks, count_solids(blocks), 2, 2, targets, COARSE, 40.0, 3.0) == 3
     assert count_seen(blocks, count_solids(blocks), 2, 2, targets, COARSE, 40.0, 4.0) < 4
+
+
+def test_nothing_beyond_the_last_block_is_looked_at() -> None:
+    """Five blocks a side are two coarse ones of four: the middle of the last one is not on the map."""
+    around = np.full(50, SOLID, dtype=np.uint8)
+    blocks = around[:25].reshape(5, 5)
+    blocks[:] = OPEN
+    counts = np.arange(72, dtype=np.int32) ** 2
+    solids = counts[:36].reshape(6, 6)
+    solids[:] = 0
+    targets = np.array([[1, 1], [0, 1], [1, 0]])
+    assert count_seen(blocks, solids, 0, 0, targets, 4, 20.0, 0.0) == 3
+    assert count_seen(blocks, solids, 1, 1, targets, 4, 20.0, 0.0) == 3
