@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from react_opt.certify_bound_enumerate import Found
-from react_opt.certify_bound_route import MARGIN, Floats
+from react_opt.certify_bound_route import MARGIN, ONE, Floats, Words
 from react_opt.errors import UsageError
 
 MOST_TIMES = 10**9
+SAMPLE = 400  # routes by which it is estimated how many collect a cell
 
 
 def repriced(
@@ -93,38 +94,67 @@ def best_of(
     value = np.concatenate([routes.value for routes in found])
     loss = np.concatenate([most - routes.reduced for routes, most in zip(found, best, strict=True)])
     group = np.repeat(np.arange(len(found)), [len(routes.value) for routes in found])
-    inside = np.unpackbits(sets.view(np.uint8), axis=1, bitorder="little")[:, : len(price)].astype(bool)
+    order = np.argsort(loss, kind="stable")
+    sets, value, loss, group = sets[order], value[order], loss[order], group[order]
     losable += MARGIN * max(1.0, abs(floor))
     top = floor
 
     def search(
-        open_to: NDArray[np.int64], covered: NDArray[np.bool_], left: list[int], lost: float, worth: float
+        open_to: NDArray[np.int64], covered: Words, needed: Words, left: list[int], lost: float, worth: float
     ) -> None:
         nonlocal top
-        if sum(left) == 0:
+        robots = sum(left)
+        if robots == 0:
             top = max(top, worth)
             return
-        room = losable - (top - floor) - lost
-        open_to = open_to[(loss[open_to] < room) & (np.array(left)[group[open_to]] > 0)]
-        out_of_reach = ~covered & ~inside[open_to].any(axis=0)
+        if robots == 1:  # the last one has to collect all that is needed
+            open_to = open_to[~np.any(needed & ~covered & ~sets[open_to], axis=1)]
+        open_to = open_to[np.array(left)[group[open_to]] > 0]
+        ahead, leading = 0.0, np.full(len(left), np.inf)  # the least that the routes left lose together, and each
+        for k, number in enumerate(left):
+            if number:
+                mine = loss[open_to[group[open_to] == k]]
+                if len(mine) == 0:
+                    return
+                leading[k] = mine[0]
+                ahead += number * float(mine[0])
+        within = np.bitwise_or.reduce(sets[open_to], axis=0) | covered
+        out_of_reach = ~_inside(within, len(price))
         beyond = float(price[out_of_reach].sum())
-        room = losable - (top - floor) - lost - beyond
-        if room <= 0.0 or len(open_to) == 0:
-            return
-        wanted = np.where(covered | out_of_reach, 0.0, price)
-        cell = int(np.argmax(wanted))
-        settles = wanted[cell] > room
-        turn = next(k for k, robots in enumerate(left) if robots)
-        tried = open_to[inside[open_to, cell]] if settles else open_to[group[open_to] == turn]
-        for r in tried[np.argsort(loss[tried], kind="stable")].tolist():
-            if loss[r] >= losable - (top - floor) - lost - beyond:
-                return
-            rest = open_to[~(inside[open_to] & inside[r]).any(axis=1)]
-            if not settles:  # the routes of a class are chosen by rising loss
-                earlier = (group[rest] == turn) & ((loss[rest] < loss[r]) | ((loss[rest] == loss[r]) & (rest < r)))
-                rest = rest[~earlier]
-            fewer = [robots - (k == group[r]) for k, robots in enumerate(left)]
-            search(rest, covered | inside[r], fewer, lost + float(loss[r]), worth + float(value[r]))
 
-    search(np.arange(len(value)), np.zeros(len(price), dtype=bool), list(counts), 0.0, 0.0)
+        def spare() -> float:
+            return losable - (top - floor) - lost - beyond - ahead
+
+        open_to = open_to[loss[open_to] < leading[group[open_to]] + spare()]
+        if len(open_to) == 0:
+            return
+        wanted = np.flatnonzero((price > spare()) & ~out_of_reach & ~_inside(covered, len(price)))
+        needed = np.zeros_like(covered)
+        np.bitwise_or.at(needed, wanted // 64, ONE << (wanted % 64).astype(np.uint64))
+        turn = max(k for k, number in enumerate(left) if number)
+        part = spare() / left[turn]
+        tried = open_to[(group[open_to] == turn) & (loss[open_to] < leading[turn] + part)]
+        ordered, sample = True, open_to[:: 1 + len(open_to) // SAMPLE]
+        ways = len(tried) * len(sample) // len(open_to)
+        for cell in wanted.tolist():
+            mark = ONE << np.uint64(cell % 64)
+            if (often := int(np.count_nonzero(sets[sample, cell // 64] & mark))) < ways:
+                tried, ordered, ways = open_to[(sets[open_to, cell // 64] & mark) != 0], False, often
+        for r in tried.tolist():
+            if loss[r] >= leading[group[r]] + spare():
+                continue
+            rest = open_to[~np.any(sets[open_to] & sets[r], axis=1)]
+            if ordered:  # the routes of a class are chosen by rising loss
+                rest = rest[(group[rest] != turn) | (rest >= r)]
+            fewer = [number - (k == group[r]) for k, number in enumerate(left)]
+            search(rest, covered | sets[r], needed, fewer, lost + float(loss[r]), worth + float(value[r]))
+
+    none = np.zeros(sets.shape[1], np.uint64)
+    search(np.arange(len(value)), none, none, list(counts), 0.0, 0.0)
     return top
+
+
+def _inside(held: Words, n_cells: int) -> NDArray[np.bool_]:
+    """Return ``(n_cells,)`` which cells a set holds."""
+    cells: NDArray[np.bool_] = np.unpackbits(held.view(np.uint8), bitorder="little")[:n_cells].astype(np.bool_)
+    return cells

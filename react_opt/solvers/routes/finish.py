@@ -23,7 +23,7 @@ EASIER = 0.85  # share of the last hopeless gap at which it is tried again
 LEAST, MOST = 400_000, 6_000_000  # labels of each direction; in between twice as many as labels priced so far
 MOST_ROUTES = 300_000  # in the linear programme
 PATIENCE = 5  # looks at all routes that may fail to lower the bound by so much of the gap
-FIRST_WORK, MOST_WORK = 100_000_000, 1_000_000_000  # looks at routes when choosing among them, at most about a second
+FIRST_WORK, MOST_WORK = 400_000_000, 2_000_000_000  # looks at routes when choosing among them: one second, or some
 
 
 class Finished(NamedTuple):
@@ -137,6 +137,10 @@ class Finish:
             best, whole = self._complete(program, found)
             if not whole:
                 return Finished(best.bound, (best,)), False
+            left = np.where(must, np.inf, np.maximum(best.cell, 0.0))
+            worth, going = self._best_of(program.pool, left, self._gap(best), FIRST_WORK, found)
+            if not going:
+                return Finished(worth, tuple(program.stages)), True
         while True:
             more = program.tighten()
             prices = program.prices

@@ -85,3 +85,34 @@ def test_a_search_that_is_given_up_says_so() -> None:
     pool, _, counts, price, bound = _case(2)
     assert not best_choice(pool, counts, price, bound, 0.0, 0, np.zeros(1, np.uint8))[2]
     assert not best_choice(pool, counts, price, bound, 0.0, 10**8, np.ones(1, np.uint8))[2]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_both_searches_agree_on_long_lists(seed: int) -> None:
+    """Among more routes than one block or sample holds both find the same choice, where a cell may be left and not."""
+    rng = np.random.default_rng(seed)
+    n, m, counts = 40, 20_000, np.array([2, 1], np.int64)
+    first, length = rng.integers(0, n, m), rng.integers(8, 20, m)
+    inside = ((np.arange(n) - first[:, None]) % n < length[:, None]) & (rng.random((m, n)) < 0.97)
+    loss = np.sort(rng.exponential(1.0, m))
+    loss[0] = 0.0
+    group = rng.integers(0, 2, m)
+    group[:2] = 0, 1
+    loss[1] = 0.0
+    price = rng.uniform(0.05, 2.0, n)
+    padded = np.zeros((m, 64), np.uint8)
+    padded[:, :n] = inside
+    sets = np.packbits(padded, axis=1, bitorder="little").view(np.uint64)
+    value = inside @ price - loss
+    bound = float(price.sum())
+    pool = Pool(value, loss, group, sets)
+    for losable in (0.5, 1.5):
+        floor = bound - losable
+        chosen, worth, complete = best_choice(pool, counts, price, losable, floor, 10**9, np.zeros(1, np.uint8))
+        assert complete
+        if chosen[0] >= 0:
+            assert value[chosen].sum() == pytest.approx(worth)
+            assert inside[chosen].sum(axis=0).max() <= 1
+        found = [Found(sets[group == k], -loss[group == k], value[group == k]) for k in (0, 1)]
+        assert best_of(found, [0.0, 0.0], counts.tolist(), price, losable, floor) == pytest.approx(worth)
+    assert worth > floor
