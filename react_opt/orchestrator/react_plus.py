@@ -10,6 +10,8 @@ before the next one.
   coverage grows early and the end comes soon: a small region is taken along where coming back for it would cost more,
   or where it is worth the time at a price per m^2 that is the same in each decision; an area that has been seen in
   passing is no target any more. Crumbs are left until nothing else is.
+* What is seen of other regions on a way counts (:mod:`react_opt.orchestrator.passing`): a region that will have been
+  seen in passing is not driven to, and ways that show more are preferred.
 * Robots are led through the next few places of their tours on ways that are quick to drive
   (:mod:`react_opt.orchestrator.guide`, :mod:`react_opt.orchestrator.smooth`).
 * The regions of a robot that does not get on go to the others (:mod:`react_opt.orchestrator.setbacks`).
@@ -25,13 +27,14 @@ from numpy.typing import NDArray
 from react_opt.orchestrator.belief import Belief, FloatArray, RobotView
 from react_opt.orchestrator.guide import Guide
 from react_opt.orchestrator.orders import able
+from react_opt.orchestrator.passing import in_passing
 from react_opt.orchestrator.regions import HiddenSpace, Region, Regions
 from react_opt.orchestrator.setbacks import Setbacks
 from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptions
 from react_opt.orchestrator.survey import COARSE, Block, Survey
 from react_opt.orchestrator.survey_drives import ways_out
 from react_opt.orchestrator.survey_kernels import OPEN
-from react_opt.orchestrator.tours import insert_all, plan_tours
+from react_opt.orchestrator.tours import Tasks, insert_all, plan_tours, tour_cost
 from react_opt.orchestrator.views import count_seen
 
 REPLAN_S = 3.0
@@ -49,6 +52,8 @@ HIDDEN_SLOWER = 1.5
 """Ways through hidden space take so much longer, if there are any: most walls have another side."""
 KEEP_S = 2.0
 """What turning away from the present target costs, s: new plans must be better than that."""
+BETTER_S = 12.0
+"""New tours must cost so much less than the last ones with what is new put in, s of :func:`tour_cost`."""
 SERVICE_S = 1.0
 """What looking into a region takes beyond the drive, s: braking, turning, driving off."""
 MOST_TARGETS = 40
@@ -168,16 +173,21 @@ class ReactPlus:
         start_s = self._starts(robots, fields, found) + SERVICE_S + self.setbacks.delay_s(robots)[:, None]
         out = self.setbacks.out_of_reach(robots, [region.at_m for region in found])
         start_s[out | ~np.isfinite(start_s)] = FAR_S
-        between_s = self._between(belief.t_s, found)
+        between_s, between = self._between(belief.t_s, found)
         value = np.array([region.value_m2 for region in found])
         known_m2 = float(np.count_nonzero(self.survey.blocks == OPEN)) * self.survey.block_m**2
         first = np.array([self._same(self.goals.get(robot.id), found) for robot in robots], dtype=np.int64)
         left_s = max(1.0, self.options.horizon_s - belief.t_s)
         sweep_m2_s = sum(robot.profile.lidar_range_m * robot.profile.speed_max_m_s for robot in robots)
         price_s = SWEEPS / sweep_m2_s
-        facts = (start_s, between_s, value, known_m2, SHARES, WEIGHTS, price_s, left_s, first, KEEP_S)
-        begin, missing = self._begin(found, len(robots))
-        order, _ = plan_tours(insert_all(begin, missing, *facts), *facts, WORK)
+        at_first, on_way = in_passing(self.survey, self.regions, found, (fields, between))
+        tasks = Tasks(
+            start_s, between_s, at_first, on_way, value, known_m2, SHARES, WEIGHTS, price_s, left_s, first, KEEP_S
+        )
+        kept = insert_all(*self._begin(found, len(robots)), tasks)
+        order, cost = plan_tours(kept, tasks, WORK)
+        if cost > tour_cost(kept, tasks, np.empty(len(found))) - BETTER_S:
+            order = kept
         tours = _split(order)
         self.tours = [[found[k].at_m for k in tour] for tour in tours]
         for n, (robot, tour) in enumerate(zip(robots, tours, strict=True)):
@@ -205,17 +215,15 @@ class ReactPlus:
             rows.append(field[views[:, 0], views[:, 1]] + profile.turn_time_s(turn) + brakes_s)
         return np.array(rows)
 
-    def _between(self, now_s: float, found: list[Region]) -> FloatArray:
-        """Return s between the places of regions, from fields that are at most a few seconds old."""
+    def _between(self, now_s: float, found: list[Region]) -> tuple[FloatArray, FloatArray]:
+        """Return s between the places of regions, and s from each of them to everywhere, a few seconds old perhaps."""
         assert self.survey is not None
-        rows = []
-        for region in found:
-            field = self._field(now_s, region.view)
-            rows.append([field[other.view] for other in found])
+        fields = np.array([self._field(now_s, region.view) for region in found])
         self.fields = {block: row for block, row in self.fields.items() if now_s <= row[0] + FIELD_S}
-        between = np.array(rows) + SERVICE_S
+        views = np.array([region.view for region in found], dtype=np.int64)
+        between = fields[:, views[:, 0], views[:, 1]] + SERVICE_S
         between[~np.isfinite(between)] = FAR_S
-        return between
+        return between, fields
 
     def _field(self, now_s: float, block: Block) -> FloatArray:
         """Return drive times from a block, a few seconds old perhaps."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,8 @@ class Region:
         ``(k, 2)`` its hidden coarse blocks that can be seen from the frontier, empty for a deep one.
     ground
         Numbers of all its hidden coarse blocks, row by row, empty for a deep one.
+    number
+        Which piece of the frontier it is; of a deep one, -1 less the number of its area.
     """
 
     at_m: Point
@@ -92,6 +95,7 @@ class Region:
     area: str
     blocks: IntArray
     ground: IntArray
+    number: int
 
     def is_part_of(self, before: Region, near_m: float) -> bool:
         """Tell whether this is what is left of an earlier region: frontiers move as robots look behind them."""
@@ -99,6 +103,19 @@ class Region:
             return True
         left = len(np.intersect1d(self.ground, before.ground, assume_unique=True))
         return bool(2 * left > len(self.ground))
+
+
+class Belonging(NamedTuple):
+    """To what the hidden coarse blocks of a survey belong."""
+
+    owner: IntArray
+    """``(rows, cols)`` number of the piece of the frontier, -1 for none."""
+    depth: FloatArray
+    """``(rows, cols)`` how far behind the frontier, coarse blocks."""
+    area_of: IntArray
+    """``(rows, cols)`` number of the area."""
+    behind: FloatArray
+    """Hidden blocks that each area's deep region stands for."""
 
 
 class Regions:
@@ -117,6 +134,8 @@ class Regions:
         self.hidden_space = hidden_space or HiddenSpace()
         self._area_of: IntArray | None = None
         self._area_key: tuple[object, ...] = ()
+        self.belonging: Belonging | None = None
+        """Of the regions that were found last."""
 
     def areas_of_blocks(self, survey: Survey, areas: Sequence[AreaView]) -> IntArray:
         """Return for each coarse block the index of its area: the one whose centre is nearest along the worse axis."""
@@ -172,6 +191,7 @@ class Regions:
             may_stand[low_row : row + LOOKED_BLOCKS + 1, low_col : col + LOOKED_BLOCKS + 1] = False
         grounds = _grounds(owner, len(clusters))
         members = [ground[depth[ground[:, 0], ground[:, 1]] <= 3.0 / survey.coarse_m] for ground in grounds]
+        self.belonging = Belonging(owner, depth, area_of, behind[:, 0])
         found = []
         for n, cluster in enumerate(clusters):
             value = min(float(near[n]) * block_m2, self.hidden_space.most_per_m * cluster.length_m)
@@ -192,6 +212,7 @@ class Regions:
                     areas[int(area_of[row, col])].id,
                     members[n],
                     grounds[n][:, 0] * owner.shape[1] + grounds[n][:, 1],
+                    n,
                 )
             )
         for n, area in enumerate(areas) if deep else ():
@@ -203,7 +224,7 @@ class Regions:
             if block is not None:
                 at = survey.point_of(block)
                 size_m2 = float(behind[n, 0]) * survey.block_m**2
-                found.append(Region(at, at, block, value, size_m2, 0.0, area.id, NONE, NONE[:, 0]))
+                found.append(Region(at, at, block, value, size_m2, 0.0, area.id, NONE, NONE[:, 0], -1 - n))
         return found
 
     def _view(

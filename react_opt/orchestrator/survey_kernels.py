@@ -262,3 +262,19 @@ def cut(
             low = high
             waiting -= 1
     return first[:count], last[:count], middle[:count], length[:count]
+
+
+@kernel
+def sight_codes(blocks: Grid, m: int) -> Grid:
+    """Return what ``m`` x ``m`` blocks are together: SOLID where most are, else HIDDEN where any is, else OPEN."""
+    rows, cols = blocks.shape
+    out = np.zeros(((rows + m - 1) // m, (cols + m - 1) // m), dtype=np.uint8)
+    for a in range(out.shape[0]):
+        for b in range(out.shape[1]):
+            solid, hidden = 0, 0
+            for r in range(a * m, min((a + 1) * m, rows)):
+                for c in range(b * m, min((b + 1) * m, cols)):
+                    solid += blocks[r, c] == SOLID
+                    hidden += blocks[r, c] == HIDDEN
+            out[a, b] = SOLID if solid > 1 else HIDDEN if hidden > 0 else OPEN
+    return out

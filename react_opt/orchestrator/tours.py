@@ -5,9 +5,14 @@ of the end. That weighs the first square metres against the last ones: a small r
 coming back for it costs more than what waits. The end comes when going on costs more than what is left behind is worth,
 at a price per unit of worth: a visit is made in passing if the time that it costs is less than its price, however much
 of the whole is still to come, and nothing is planned for the sake of crumbs. All robots are planned together.
+
+What is seen of other targets on a way counts, whoever drives it; a target of which little is left by the time that its
+turn comes is passed over.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,118 +22,121 @@ from react_opt.kernels import kernel
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-Facts = tuple[
-    FloatArray, FloatArray, FloatArray, float, FloatArray, FloatArray, float, float, IntArray, float, FloatArray
-]
+
+class Tasks(NamedTuple):
+    """What there is to visit, and how long the ways take."""
+
+    start_s: FloatArray
+    """``(R, K)`` s from robots to targets."""
+    between_s: FloatArray
+    """``(K, K)`` s between targets."""
+    at_first: FloatArray
+    """``(R, K, K)`` which share of each target has been seen when a robot has come to a target; of that one, all."""
+    on_way: FloatArray
+    """``(K, K, K)`` which share of each target is seen on the way between two, both ends included."""
+    value: FloatArray
+    """``(K,)`` worth of each target."""
+    known: float
+    """What is covered already, in the same unit."""
+    shares: FloatArray
+    """Shares of all there is, increasing, whose times count."""
+    weights: FloatArray
+    """What each second until they are reached costs."""
+    price_s: float
+    """What it costs to leave a unit of worth behind at the end, s."""
+    left_s: float
+    """Time left; what is visited later counts as missed."""
+    first: IntArray
+    """``(R,)`` target that each robot is on its way to (-1: none)."""
+    keep_s: float
+    """What turning away from it costs."""
+
 
 END = 3.0
 """Weight of the end."""
+SEEN = 0.25
+"""A target of which no more than this share is unseen is not driven to."""
 MISSED_S = 300.0
 """What it costs to reach nothing of the whole in time, s; of a part of it as much less."""
 
 
 @kernel
-def tour_cost(
-    order: IntArray,
-    start_s: FloatArray,
-    between_s: FloatArray,
-    value: FloatArray,
-    known: float,
-    shares: FloatArray,
-    weights: FloatArray,
-    price_s: float,
-    left_s: float,
-    first: IntArray,
-    keep_s: float,
-    arrive: FloatArray,
-) -> float:
+def tour_cost(order: IntArray, tasks: Tasks, unseen: FloatArray) -> float:
     """Return the cost of tours, s.
 
     Parameters
     ----------
     order
         Targets in order of visit, robot after robot, with -1 between robots.
-    start_s, between_s
-        ``(R, K)`` and ``(K, K)`` s.
-    value, known
-        ``(K,)`` worth of each target, and what is covered already, in the same unit.
-    shares, weights
-        Shares of all there is, increasing, and what each second until they are reached costs.
-    price_s
-        What it costs to leave a unit of worth behind at the end, s.
-    left_s
-        Time left; what is visited later counts as missed.
-    first, keep_s
-        ``(R,)`` target that each robot is on its way to (-1: none), and what turning away from it costs.
-    arrive
-        ``(R, K + 1)`` scratch space.
+    tasks
+        What there is to visit.
+    unseen
+        ``(K,)`` scratch space.
     """
-    robots, count = start_s.shape
-    robot, at, now, cost = 0, -1, 0.0, 0.0
-    length = np.zeros(robots, dtype=np.int64)
-    worth = np.empty((robots, count + 1))
-    spread, missed = 0.0, 0.0
-    for n in range(order.shape[0]):
-        k = order[n]
-        if k < 0:
-            robot, at, now = robot + 1, -1, 0.0
-            continue
-        if at < 0:
-            now = start_s[robot, k]
-            if first[robot] >= 0 and first[robot] != k:
-                now += keep_s
-        else:
-            now += between_s[at, k]
-        at = k
-        arrive[robot, length[robot]], worth[robot, length[robot]] = now, value[k]
-        length[robot] += 1
-        spread += now * value[k]
-        if now > left_s:
-            missed += value[k]
+    value, known, price_s, left_s = tasks.value, tasks.known, tasks.price_s, tasks.left_s
+    shares, weights = tasks.shares, tasks.weights
+    robots, count = tasks.start_s.shape
+    unseen[:] = 1.0
     total = known
     for k in range(count):
         total += value[k]
     covered, step = known, 0
     while step < shares.shape[0] and covered >= shares[step] * total - 1e-9:
         step += 1
-    cursor = np.zeros(robots, dtype=np.int64)
+    cursor, clock = np.zeros(robots, dtype=np.int64), np.full(robots, np.inf)
+    last, driven = np.full(robots, -1, dtype=np.int64), np.zeros(robots)
+    robot = 0
+    for n in range(order.shape[0]):
+        if order[n] < 0:
+            robot += 1
+            cursor[robot] = n + 1
+    for r in range(robots):
+        n = cursor[r]
+        if n < order.shape[0] and order[n] >= 0:
+            clock[r] = tasks.start_s[r, order[n]]
+            if tasks.first[r] >= 0 and tasks.first[r] != order[n]:
+                clock[r] += tasks.keep_s
+    cost, spread, missed = 0.0, 0.0, 0.0
     end = price_s * (total - covered)
     while True:
-        best, when = -1, np.inf
-        for r in range(robots):
-            if cursor[r] < length[r] and arrive[r, cursor[r]] < when:
-                best, when = r, arrive[r, cursor[r]]
-        if best < 0:
+        r, when = 0, clock[0]
+        for q in range(1, robots):
+            if clock[q] < when:
+                r, when = q, clock[q]
+        if when == np.inf:
             break
-        covered += worth[best, cursor[best]]
-        cursor[best] += 1
+        k = order[cursor[r]]
+        shown = tasks.at_first[r, k] if last[r] < 0 else tasks.on_way[last[r], k]
+        gain = 0.0
+        for m in range(count):
+            if unseen[m] > 1.0 - shown[m]:
+                gain += value[m] * (unseen[m] - (1.0 - shown[m]))
+                unseen[m] = 1.0 - shown[m]
+        last[r], driven[r] = k, when
+        covered += gain
+        spread += when * gain
+        if when > left_s:
+            missed += gain
         end = min(end, when + price_s * (total - covered))
         while step < shares.shape[0] and covered >= shares[step] * total - 1e-9:
             cost += weights[step] * when
             step += 1
+        n = cursor[r] + 1
+        while n < order.shape[0] and order[n] >= 0 and unseen[order[n]] <= SEEN:
+            n += 1
+        cursor[r] = n
+        clock[r] = np.inf if n == order.shape[0] or order[n] < 0 else when + tasks.between_s[k, order[n]]
+    for n in range(step, shares.shape[0]):  # a share that is missed by what is passed over comes with the end
+        cost += weights[n] * driven.max()
     cost += END * end + MISSED_S * missed / (total + 1e-9)
-    driven = 0.0
+    length = 0.0
     for r in range(robots):
-        if length[r] > 0:
-            driven += min(arrive[r, length[r] - 1], 2.0 * left_s)
-    return cost + 0.02 * driven + 0.2 * spread / (total - known + 1e-9)
+        length += min(driven[r], 2.0 * left_s)
+    return cost + 0.02 * length + 0.2 * spread / (total - known + 1e-9)
 
 
 @kernel
-def plan_tours(
-    begin: IntArray,
-    start_s: FloatArray,
-    between_s: FloatArray,
-    value: FloatArray,
-    known: float,
-    shares: FloatArray,
-    weights: FloatArray,
-    price_s: float,
-    left_s: float,
-    first: IntArray,
-    keep_s: float,
-    work: int,
-) -> tuple[IntArray, float]:
+def plan_tours(begin: IntArray, tasks: Tasks, work: int) -> tuple[IntArray, float]:
     """Return tours and their cost, by local search from given ones: deterministic, and limited by counted work.
 
     Moves: a run of up to three targets goes elsewhere, forwards or backwards; two targets change places; a stretch
@@ -139,16 +147,14 @@ def plan_tours(
     ----------
     begin
         Tours to start from, as for :func:`tour_cost`: every target once and R - 1 separators.
+    tasks
+        What there is to visit.
     work
         Most evaluations.
-
-    The other parameters are those of :func:`tour_cost`.
     """
-    robots, count = start_s.shape
-    arrive = np.empty((robots, count + 1))
-    facts = (start_s, between_s, value, known, shares, weights, price_s, left_s, first, keep_s, arrive)
+    unseen = np.empty(len(tasks.value))
     best = begin.copy()
-    best_cost, done = _descend(best, facts, work)
+    best_cost, done = _descend(best, tasks, unseen, work)
     n = best.shape[0]
     order, trial = best.copy(), best.copy()
     dice = 12345
@@ -161,7 +167,7 @@ def plan_tours(
             dice = (dice * 1103515245 + 12345) % 2147483648
             _move(order, trial, i, run, (dice >> 8) % (n - run + 1), (dice >> 20) % 2 == 1)
             order[:] = trial
-        cost, used = _descend(order, facts, work - done)
+        cost, used = _descend(order, tasks, unseen, work - done)
         done += used + 1
         if cost < best_cost - 1e-6:
             best[:] = order
@@ -170,11 +176,11 @@ def plan_tours(
 
 
 @kernel
-def _descend(order: IntArray, facts: Facts, work: int) -> tuple[float, int]:
+def _descend(order: IntArray, tasks: Tasks, unseen: FloatArray, work: int) -> tuple[float, int]:
     """Improve tours in place until no move helps or the work is used up; return their cost, and the work done."""
     n = order.shape[0]
     trial = np.empty(n, dtype=np.int64)
-    cost = tour_cost(order, *facts)
+    cost = tour_cost(order, tasks, unseen)
     done = 1
     improved = True
     while improved and done < work:
@@ -186,7 +192,7 @@ def _descend(order: IntArray, facts: Facts, work: int) -> tuple[float, int]:
                         continue
                     for back in range(2 if run > 1 else 1):
                         _move(order, trial, i, run, j, back == 1)
-                        new = tour_cost(trial, *facts)
+                        new = tour_cost(trial, tasks, unseen)
                         done += 1
                         if new < cost - 1e-6:
                             order[:] = trial
@@ -197,7 +203,7 @@ def _descend(order: IntArray, facts: Facts, work: int) -> tuple[float, int]:
                     break
                 trial[:] = order
                 trial[i], trial[j] = order[j], order[i]
-                new = tour_cost(trial, *facts)
+                new = tour_cost(trial, tasks, unseen)
                 done += 1
                 if new < cost - 1e-6:
                     order[:] = trial
@@ -205,7 +211,7 @@ def _descend(order: IntArray, facts: Facts, work: int) -> tuple[float, int]:
                 trial[:] = order
                 for k in range(j - i + 1):
                     trial[i + k] = order[j - k]
-                new = tour_cost(trial, *facts)
+                new = tour_cost(trial, tasks, unseen)
                 done += 1
                 if new < cost - 1e-6:
                     order[:] = trial
@@ -234,24 +240,9 @@ def _move(order: IntArray, trial: IntArray, i: int, run: int, j: int, back: bool
 
 
 @kernel
-def insert_all(
-    order: IntArray,
-    missing: IntArray,
-    start_s: FloatArray,
-    between_s: FloatArray,
-    value: FloatArray,
-    known: float,
-    shares: FloatArray,
-    weights: FloatArray,
-    price_s: float,
-    left_s: float,
-    first: IntArray,
-    keep_s: float,
-) -> IntArray:
+def insert_all(order: IntArray, missing: IntArray, tasks: Tasks) -> IntArray:
     """Return tours with the missing targets put in one after the other, each where it costs least."""
-    robots, count = start_s.shape
-    arrive = np.empty((robots, count + 1))
-    facts = (start_s, between_s, value, known, shares, weights, price_s, left_s, first, keep_s, arrive)
+    unseen = np.empty(len(tasks.value))
     now = order.copy()
     for m in range(missing.shape[0]):
         n = now.shape[0]
@@ -259,7 +250,7 @@ def insert_all(
         trial = np.empty(n + 1, dtype=np.int64)
         for j in range(n + 1):
             trial[:j], trial[j], trial[j + 1 :] = now[:j], missing[m], now[j:]
-            new = tour_cost(trial, *facts)
+            new = tour_cost(trial, tasks, unseen)
             if new < cost:
                 best, cost = j, new
         after = np.empty(n + 1, dtype=np.int64)

@@ -92,7 +92,7 @@ def test_ways_keep_clear_of_robots_that_died(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def region(at_m: tuple[float, float], ground: list[int], frontier_m: float = 1.0, area: str = "0,0") -> Region:
-    return Region(at_m, at_m, (0, 0), 1.0, 1.0, frontier_m, area, NONE, np.array(ground, dtype=np.int64))
+    return Region(at_m, at_m, (0, 0), 1.0, 1.0, frontier_m, area, NONE, np.array(ground, dtype=np.int64), 0)
 
 
 def test_a_region_is_what_is_left_of_another_by_its_hidden_ground() -> None:

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from react_opt.orchestrator.tours import insert_all, plan_tours, tour_cost
+from react_opt.orchestrator.tours import Tasks, insert_all, plan_tours, tour_cost
 
 SHARES = np.array([0.8, 0.97, 1.0])
 WEIGHTS = np.array([1.0, 2.0, 1.0])
@@ -17,34 +17,39 @@ PRICE_S = 10.0
 def line(  # type: ignore[no-untyped-def]
     at: list[float], starts: list[float], value: list[float], left_s: float = 1000.0, price_s: float = PRICE_S
 ):
-    """Return the facts of targets on a line, where a metre takes a second."""
+    """Return targets on a line, where a metre takes a second."""
     x, s = np.array(at), np.array(starts)
-    first = np.full(len(s), -1, dtype=np.int64)
-    return (
-        np.abs(s[:, None] - x[None]), np.abs(x[:, None] - x[None]), np.array(value), 0.0, SHARES, WEIGHTS, price_s,
-        left_s, first, 0.0,
+    return tasks_of(np.abs(s[:, None] - x[None]), np.abs(x[:, None] - x[None]), value, left_s=left_s, price_s=price_s)
+
+
+def tasks_of(start_s, between_s, value, **changes) -> Tasks:  # type: ignore[no-untyped-def]
+    """Return targets of which nothing is seen but from their own place."""
+    robots, count = start_s.shape
+    tasks = Tasks(
+        start_s, between_s, np.tile(np.eye(count), (robots, 1, 1)), np.tile(np.eye(count), (count, 1, 1)),
+        np.array(value), 0.0, SHARES, WEIGHTS, PRICE_S, 1000.0, np.full(robots, -1, dtype=np.int64), 0.0,
     )  # fmt: skip
+    return tasks._replace(**changes)
 
 
-def planned(facts, work: int = 20_000):  # type: ignore[no-untyped-def]
-    robots, count = facts[0].shape
-    begin = insert_all(np.full(robots - 1, -1, dtype=np.int64), np.arange(count), *facts)
-    return plan_tours(begin, *facts, work)
+def planned(tasks: Tasks, work: int = 20_000):  # type: ignore[no-untyped-def]
+    robots, count = tasks.start_s.shape
+    begin = insert_all(np.full(robots - 1, -1, dtype=np.int64), np.arange(count), tasks)
+    return plan_tours(begin, tasks, work)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_small_fleets_get_the_best_of_all_tours(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points, starts = rng.uniform(0, 30, (4, 2)), rng.uniform(0, 30, (2, 2))
-    facts = (
+    tasks = tasks_of(
         np.hypot(*(starts[:, None] - points[None]).transpose(2, 0, 1)),
         np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)),
-        rng.uniform(1, 9, 4), 5.0, SHARES, WEIGHTS, PRICE_S, 1000.0, np.full(2, -1, dtype=np.int64), 0.0,
-    )  # fmt: skip
-    best = min(
-        tour_cost(np.array(order), *facts, np.empty((2, 5))) for order in itertools.permutations([0, 1, 2, 3, -1])
+        rng.uniform(1, 9, 4),
+        known=5.0,
     )
-    order, cost = planned(facts)
+    best = min(tour_cost(np.array(order), tasks, np.empty(4)) for order in itertools.permutations([0, 1, 2, 3, -1]))
+    order, cost = planned(tasks)
     assert sorted(order.tolist()) == [-1, 0, 1, 2, 3]
     assert cost <= 1.05 * best  # a local search: on instances so small it is nearly always the optimum
 
@@ -62,10 +67,22 @@ def test_two_robots_share_the_work() -> None:
 
 
 def test_a_robot_keeps_its_target_unless_another_is_better_by_more_than_turning_costs() -> None:
-    facts = list(line([10.0, -9.0], [0.0], [5.0, 5.0]))
-    assert planned(tuple(facts))[0].tolist() == [1, 0]
-    facts[8], facts[9] = np.array([0], dtype=np.int64), 3.0
-    assert planned(tuple(facts))[0].tolist() == [0, 1]
+    tasks = line([10.0, -9.0], [0.0], [5.0, 5.0])
+    assert planned(tasks)[0].tolist() == [1, 0]
+    assert planned(tasks._replace(first=np.array([0]), keep_s=3.0))[0].tolist() == [0, 1]
+
+
+def test_a_target_that_will_have_been_seen_is_passed_over() -> None:
+    """A room at 10 and a hall at 30 that shows it: driving straight to the hall is better, and ends the tour."""
+    tasks = line([10.0, 30.0], [0.0], [2.0, 50.0])._replace(start_s=np.array([[18.0, 30.0]]))
+    apart, _ = planned(tasks)
+    assert apart.tolist() == [0, 1]
+    at_first, on_way = tasks.at_first.copy(), tasks.on_way.copy()
+    at_first[0, 1, 0] = on_way[0, 1, 0] = 0.9
+    order, cost = planned(tasks._replace(at_first=at_first, on_way=on_way))
+    assert order.tolist() == [1, 0]
+    alone = tasks_of(np.array([[30.0]]), np.zeros((1, 1)), [52.0])
+    assert cost <= planned(alone)[1] + 10.0  # nearly as if there were the hall only
 
 
 def test_what_cannot_be_reached_in_time_comes_last() -> None:
@@ -79,11 +96,8 @@ def test_a_closet_is_looked_into_in_passing_if_it_is_worth_its_time(price_s: flo
     """A closet is 4 s off the way to a hall, which makes nearly all of the whole: 8 s for a worth of 1."""
     start = np.array([[4.0, 10.0]])
     between = np.array([[0.0, 14.0], [14.0, 0.0]])
-    facts = (
-        start, between, np.array([1.0, 200.0]), 0.0, np.array([0.97]), np.array([0.0]), price_s, 1000.0,
-        np.array([-1]), 0.0,
-    )  # fmt: skip
-    assert planned(facts)[0][0] == first
+    tasks = tasks_of(start, between, [1.0, 200.0], shares=np.array([0.97]), weights=np.array([0.0]), price_s=price_s)
+    assert planned(tasks)[0][0] == first
 
 
 @pytest.mark.parametrize("left_s", [1000.0, 45.0])
