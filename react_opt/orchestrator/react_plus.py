@@ -186,8 +186,8 @@ class ReactPlus:
         )
         kept = insert_all(*self._begin(found, len(robots)), tasks)
         order, cost = plan_tours(kept, tasks, WORK)
-        if cost > tour_cost(kept, tasks, np.empty(len(found))) - BETTER_S:
-            order = kept
+        if all(_split(kept)) and cost > tour_cost(kept, tasks, np.empty(len(found))) - BETTER_S:
+            order = kept  # unless a robot has nothing left to do
         tours = _split(order)
         self.tours = [[found[k].at_m for k in tour] for tour in tours]
         for n, (robot, tour) in enumerate(zip(robots, tours, strict=True)):
