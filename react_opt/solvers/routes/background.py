@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from react_opt.route_problem import Route, RouteProblem
 from react_opt.solvers.routes.budget import Standing
 from react_opt.solvers.routes.search import improve
 
 SHARE = 0.3  # of the time, where the primal search has no thread of its own
+USED_AT_ONCE = 2  # threads of the proof where it uses several
 _PATIENCE_S = 0.05  # how long the end of a solve waits for the thread; it ends soon after by itself
 
 
@@ -49,10 +50,12 @@ def beside(standing: Standing, threads: int, seed: int) -> Iterator[None]:
             standing.offer(news)
 
     budget.aside = take
+    if threads == USED_AT_ONCE:
+        budget.alone = search.paused
     try:
         yield
     finally:
-        budget.aside = None
+        budget.aside, budget.alone = None, nullcontext
         search.stop()
     take()
 
@@ -76,7 +79,8 @@ class Background:
         self._problem, self._begin, self._deadline, self._seed = problem, list(routes), deadline, seed
         self._lock = threading.Lock()
         self._news: list[Route] | None = None
-        self._ended = threading.Event()
+        self._ended, self._going = threading.Event(), threading.Event()
+        self._going.set()
         self._fault: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="primal search", daemon=True)
         self._thread.start()
@@ -92,7 +96,21 @@ class Background:
     def stop(self) -> None:
         """End the search; its thread follows within one iteration, which is not waited for very long."""
         self._ended.set()
+        self._going.set()
         self._thread.join(_PATIENCE_S)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Let the thread wait, from its next iteration on, as long as this lasts."""
+        self._going.clear()
+        try:
+            yield
+        finally:
+            self._going.set()
+
+    def _over(self) -> bool:
+        self._going.wait()
+        return self._ended.is_set()
 
     def _run(self) -> None:
         try:
@@ -101,7 +119,7 @@ class Background:
                 self._begin,
                 deadline=self._deadline,
                 seed=self._seed,
-                should_stop=self._ended.is_set,
+                should_stop=self._over,
                 on_improve=self._tell,
             )
         except BaseException as fault:  # handed to the thread that asks

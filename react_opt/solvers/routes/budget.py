@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Literal
 
 import numpy as np
@@ -41,6 +41,7 @@ class Budget:
         self.work = 0
         self.limit: Limit = "none"
         self.aside: Callable[[], None] | None = None  # done whenever the limits are asked for
+        self.alone: Callable[[], AbstractContextManager[None]] = nullcontext  # within it nothing runs beside
 
     def spend(self, units: int = 1) -> None:
         """Count work."""

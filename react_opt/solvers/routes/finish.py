@@ -89,16 +89,17 @@ class Finish:
         duals = self.generation.extended(best)
         found: list[Enumeration] = []
         for group in range(len(master.counts)):
-            routes = enumerate_routes(
-                pricer,
-                group,
-                duals,
-                float(duals.group[group]) - gap,
-                self.generation.side,
-                master.cuts,
-                max_labels=most,
-                threads=self.threads,
-            )
+            with standing.budget.alone():
+                routes = enumerate_routes(
+                    pricer,
+                    group,
+                    duals,
+                    float(duals.group[group]) - gap,
+                    self.generation.side,
+                    master.cuts,
+                    max_labels=most,
+                    threads=self.threads,
+                )
             standing.budget.spend()
             if routes is None:
                 self._hopeless_gap = self._hopeless_gap if anew else EASIER * gap
@@ -197,9 +198,10 @@ class Finish:
             ``(n_classes,)`` value minus prices from which on routes are of interest.
         """
         form = set_prices(prices.cell, prices.cuts, prices.price)
-        looks = [
-            one.look(form, float(worth), MOST_ROUTES // len(found)) for one, worth in zip(found, least, strict=True)
-        ]
+        with self.standing.budget.alone():
+            looks = [
+                one.look(form, float(worth), MOST_ROUTES // len(found)) for one, worth in zip(found, least, strict=True)
+            ]
         if any(look.whole_above == np.inf for look in looks):
             return None
         best = np.array([look.reduced.max(initial=worth) for look, worth in zip(looks, least.tolist(), strict=True)])

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import threading
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -44,6 +46,30 @@ def test_better_plans_come_while_the_budget_is_asked_for(threads: int) -> None:
     assert budget.aside is None
     assert standing.routes is not None
     assert not feasible(standing.problem, standing.routes)
+
+
+def test_the_thread_waits_where_the_proof_needs_both_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = threading.Event()
+
+    def endless(*_: object, should_stop: Callable[[], bool], **__: object) -> None:
+        while not should_stop():
+            asked.set()
+
+    monkeypatch.setattr(background, "improve", endless)
+    standing, _ = _standing(Budget(time.perf_counter() + 30.0, None, None))
+    with beside(standing, 2, seed=1):
+        assert asked.wait(10.0)
+        with standing.budget.alone():
+            settled = threading.Event()
+            for _ in range(1000):  # it may be within an iteration still
+                asked.clear()
+                if not asked.wait(0.05):
+                    settled.set()
+                    break
+            assert settled.is_set()
+        assert asked.wait(10.0)
+    with standing.budget.alone():
+        pass
 
 
 def test_nothing_runs_beside_counted_work() -> None:
