@@ -24,6 +24,7 @@ LEAST, MOST = 400_000, 6_000_000  # labels of each direction; in between twice a
 MOST_ROUTES = 300_000  # in the linear programme
 PATIENCE = 5  # looks at all routes that may fail to lower the bound by so much of the gap
 FIRST_WORK, MOST_WORK = 400_000_000, 2_000_000_000  # looks at routes when choosing among them: one second, or some
+SHORTER = 0.7  # share of the list of the last choice that was given up at which it is tried again
 
 
 class Finished(NamedTuple):
@@ -142,11 +143,15 @@ class Finish:
             worth, going = self._best_of(program.pool, left, self._gap(best), FIRST_WORK, found)
             if not going:
                 return Finished(worth, tuple(program.stages)), True
+        given_up = len(program.pool.value)
         while True:
             more = program.tighten()
             prices = program.prices
             if standing.proven(prices.bound):
                 return Finished(prices.bound, tuple(program.stages)), True
+            if more and len(program.pool.value) > SHORTER * given_up:
+                continue
+            given_up = len(program.pool.value)
             price = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
             work = FIRST_WORK if more else MOST_WORK
             worth, going = self._best_of(program.pool, price, self._gap(prices), work, found)
