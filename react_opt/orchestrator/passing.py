@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 from react_opt.kernels import kernel
 from react_opt.orchestrator.regions import DEEP_M, Region, Regions
 from react_opt.orchestrator.survey import COARSE, Survey
-from react_opt.orchestrator.survey_kernels import HIDDEN, SOLID
+from react_opt.orchestrator.survey_drives import step_back
+from react_opt.orchestrator.survey_kernels import HIDDEN, SOLID, sight_codes
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Grid = NDArray[np.uint8]
 
 RAYS = 48
+"""Rays per look: at 8 m their ends are a metre apart."""
 PLACE_BLOCKS = 4
 """Places on ways are so many coarse blocks wide: what is seen is worked out once for each."""
 
@@ -55,7 +57,8 @@ def in_passing(
     views = np.array([region.view for region in found], dtype=np.int64)
     reach = regions.range_m / survey.coarse_m
     fade = exp(-survey.coarse_m / regions.hidden_space.mean_free_m)
-    return [seen_on_ways(survey.sight, of, part, views, whole, reach, fade) for part in fields]
+    ground = sight_codes(survey.blocks, COARSE)
+    return [seen_on_ways(ground, of, part, views, whole, reach, fade) for part in fields]
 
 
 @kernel
@@ -127,7 +130,7 @@ def seen_on_ways(
             best[:] = at_view[k]
             r, c, last = views[k, 0], views[k, 1], -1
             while np.isfinite(fields[f, r, c]) and fields[f, r, c] > 0.0:
-                y, x = _before(fields[f], r, c)
+                y, x = step_back(fields[f], r, c)
                 if y == r and x == c:
                     break
                 r, c = y, x
@@ -143,14 +146,3 @@ def seen_on_ways(
             best[:] = np.minimum(1.0, best / norm)
             best[k] = 1.0
     return shares
-
-
-@kernel
-def _before(field: FloatArray, row: int, col: int) -> tuple[int, int]:
-    """Return the block from which the quickest way leads into one, itself where it begins."""
-    low, y, x = field[row, col], row, col
-    for r in range(max(0, row - 1), min(field.shape[0], row + 2)):
-        for c in range(max(0, col - 1), min(field.shape[1], col + 2)):
-            if field[r, c] < low:
-                low, y, x = field[r, c], r, c
-    return y, x

@@ -45,13 +45,16 @@ class Setbacks:
         for name, rows in self._given_up.items():
             self._given_up[name] = [row for row in rows if row[1] > now_s]
         for robot in robots:
-            place, _ = self._stuck.get(robot.id, ((np.inf, np.inf), 0))
-            if hypot(robot.x_m - place[0], robot.y_m - place[1]) >= GIVE_UP_M:
-                self._stuck.pop(robot.id, None)
+            if robot.id in self._stuck:
+                (x, y), _ = self._stuck[robot.id]
+                if hypot(robot.x_m - x, robot.y_m - y) >= GIVE_UP_M:
+                    del self._stuck[robot.id]
 
     def delay_s(self, robots: Sequence[RobotView]) -> FloatArray:
         """Return ``(R,)`` how much later than they would robots are expected, s: nothing for the first time."""
-        return np.array([STUCK_S * max(0, self._stuck.get(robot.id, ((0.0, 0.0), 0))[1] - 1) for robot in robots])
+        times = np.array([self._stuck[robot.id][1] if robot.id in self._stuck else 0 for robot in robots])
+        late: FloatArray = STUCK_S * np.maximum(0, times - 1)
+        return late
 
     def out_of_reach(self, robots: Sequence[RobotView], places_m: Sequence[Point]) -> NDArray[np.bool_]:
         """Return ``(R, K)`` which robot has given up which place."""

@@ -22,7 +22,6 @@ from react_opt.orchestrator.survey_kernels import (
     count_solids,
     cut,
     newly_solid,
-    sight_codes,
     stamp_clearance,
     survey_blocks,
     view_gain,
@@ -92,7 +91,6 @@ class Survey:
         reach_px = max(self.radius_m, self.profile.full_speed_clearance_m) / res
         self.blocks = survey_blocks(source.cells, self.k)
         self.solids = count_solids(self.blocks)
-        self.sight = sight_codes(self.blocks, COARSE)
         frame = (res, source.origin_x_m, source.origin_y_m, *map(float, source.cells.shape))
         new, kept = newly_solid(self._cells, source.cells) if frame == self._frame else (None, False)
         if new is None or not kept:

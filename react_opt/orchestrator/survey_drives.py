@@ -147,6 +147,17 @@ def drive_times(ground: Ground, starts: IntArray) -> FloatArray:
 
 
 @kernel
+def step_back(cost: FloatArray, row: int, col: int) -> tuple[int, int]:
+    """Return the block from which the quickest way leads into one, by :func:`drive_times`; itself at a start."""
+    best, y, x = cost[row, col], row, col
+    for r in range(max(0, row - 1), min(cost.shape[0], row + 2)):
+        for c in range(max(0, col - 1), min(cost.shape[1], col + 2)):
+            if cost[r, c] < best:
+                best, y, x = cost[r, c], r, c
+    return y, x
+
+
+@kernel
 def ways_out(cost: FloatArray, places: NDArray[np.int64], near: float) -> NDArray[np.int64]:
     """Return by which block the quickest way to each of some places leaves the block that a field starts from.
 
@@ -164,19 +175,13 @@ def ways_out(cost: FloatArray, places: NDArray[np.int64], near: float) -> NDArra
     blocks
         ``(K, 2)`` rows and columns; the place itself where it is that near or has no way.
     """
-    rows, cols = cost.shape
     blocks = places.copy()
     for k in range(places.shape[0]):
         r, c = places[k, 0], places[k, 1]
         if not np.isfinite(cost[r, c]):
             continue
         while cost[r, c] > near:
-            best, y, x = cost[r, c], r, c
-            for dr in range(-1, 2):
-                for dc in range(-1, 2):
-                    a, b = r + dr, c + dc
-                    if 0 <= a < rows and 0 <= b < cols and cost[a, b] < best:
-                        best, y, x = cost[a, b], a, b
+            y, x = step_back(cost, r, c)
             if y == r and x == c:
                 break
             r, c = y, x

@@ -266,7 +266,7 @@ def cut(
 
 @kernel
 def sight_codes(blocks: Grid, m: int) -> Grid:
-    """Return what ``m`` x ``m`` blocks are together: SOLID where most are, else HIDDEN where any is, else OPEN."""
+    """Return what ``m`` x ``m`` blocks are together: SOLID where half of them are, HIDDEN where any is, else OPEN."""
     rows, cols = blocks.shape
     out = np.zeros(((rows + m - 1) // m, (cols + m - 1) // m), dtype=np.uint8)
     for a in range(out.shape[0]):
@@ -276,5 +276,5 @@ def sight_codes(blocks: Grid, m: int) -> Grid:
                 for c in range(b * m, min((b + 1) * m, cols)):
                     solid += blocks[r, c] == SOLID
                     hidden += blocks[r, c] == HIDDEN
-            out[a, b] = SOLID if solid > 1 else HIDDEN if hidden > 0 else OPEN
+            out[a, b] = SOLID if 2 * solid >= m * m else HIDDEN if hidden > 0 else OPEN
     return out

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from react_opt.route_problem import FloatArray
 from react_opt.solvers.routes.budget import Standing
@@ -127,8 +128,7 @@ class Finish:
             return Finished(standing.objective or 0.0), True
         if whole:
             self.routes += len(pool.value)
-            left = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
-            worth, going = self._best_of(pool, left, self._gap(prices), FIRST_WORK, found)
+            worth, going = self._best_of(pool, prices, must, FIRST_WORK, found)
             if not going:
                 return Finished(worth), True
         more_cuts = self._violated(set(prices.cuts))
@@ -139,8 +139,7 @@ class Finish:
             best, whole = self._complete(program, found)
             if not whole:
                 return Finished(best.bound, (best,)), False
-            left = np.where(must, np.inf, np.maximum(best.cell, 0.0))
-            worth, going = self._best_of(program.pool, left, self._gap(best), FIRST_WORK, found)
+            worth, going = self._best_of(program.pool, best, must, FIRST_WORK, found)
             if not going:
                 return Finished(worth, tuple(program.stages)), True
         given_up = len(program.pool.value)
@@ -152,9 +151,7 @@ class Finish:
             if more and len(program.pool.value) > SHORTER * given_up:
                 continue
             given_up = len(program.pool.value)
-            price = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
-            work = FIRST_WORK if more else MOST_WORK
-            worth, going = self._best_of(program.pool, price, self._gap(prices), work, found)
+            worth, going = self._best_of(program.pool, prices, must, FIRST_WORK if more else MOST_WORK, found)
             if not going:
                 return Finished(worth, tuple(program.stages)), True
             if not more:
@@ -236,13 +233,26 @@ class Finish:
         return separate_sets(inside, point.use[used], known, CUTS_AT_ONCE)
 
     def _best_of(
-        self, pool: Pool, price: FloatArray, gap: float, most_work: int, found: list[Enumeration]
+        self, pool: Pool, prices: PoolPrices, must: NDArray[np.bool_], most_work: int, found: list[Enumeration]
     ) -> tuple[float, bool]:
-        """Offer the best choice from a pool; return its value and whether there may be a better one."""
+        """Offer the best choice from a pool; return its value and whether there may be a better one.
+
+        Parameters
+        ----------
+        pool, prices
+            The routes, and the prices that say what they lose.
+        must
+            ``(n_cells,)`` cells that have to be collected.
+        most_work
+            Looks at routes after which it is given up.
+        found
+            The routes of each class.
+        """
         standing, pricer = self.standing, self.generation.pricer
         floor = -np.inf if standing.objective is None else standing.objective
         counts = np.array(self.generation.master.counts, dtype=np.int64)
-        best, worth, complete = best_choice(pool, counts, price, gap, floor, most_work, pricer.stop)
+        price = np.where(must, np.inf, np.maximum(prices.cell, 0.0))
+        best, worth, complete = best_choice(pool, counts, price, self._gap(prices), floor, most_work, pricer.stop)
         standing.budget.spend()
         if best[0] >= 0:
             columns = [

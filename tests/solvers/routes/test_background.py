@@ -56,9 +56,9 @@ def test_the_thread_waits_where_the_proof_needs_both_threads(monkeypatch: pytest
             asked.set()
 
     monkeypatch.setattr(background, "improve", endless)
-    standing, _ = _standing(Budget(time.perf_counter() + 30.0, None, None))
+    standing, _ = _standing(Budget(time.perf_counter() + 600.0, None, None))
     with beside(standing, 2, seed=1):
-        assert asked.wait(10.0)
+        assert asked.wait(300.0)
         with standing.budget.alone():
             settled = threading.Event()
             for _ in range(1000):  # it may be within an iteration still
@@ -67,7 +67,7 @@ def test_the_thread_waits_where_the_proof_needs_both_threads(monkeypatch: pytest
                     settled.set()
                     break
             assert settled.is_set()
-        assert asked.wait(10.0)
+        assert asked.wait(300.0)
     with standing.budget.alone():
         pass
 
