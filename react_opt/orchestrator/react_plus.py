@@ -34,7 +34,7 @@ from react_opt.orchestrator.strategy import Decision, Note, Order, StrategyOptio
 from react_opt.orchestrator.survey import COARSE, Block, Survey
 from react_opt.orchestrator.survey_drives import ways_out
 from react_opt.orchestrator.survey_kernels import OPEN
-from react_opt.orchestrator.tours import Tasks, insert_all, plan_tours, tour_cost
+from react_opt.orchestrator.tours import Tasks, better_tours, insert_all
 from react_opt.orchestrator.views import count_seen
 
 REPLAN_S = 3.0
@@ -53,7 +53,7 @@ HIDDEN_SLOWER = 1.5
 KEEP_S = 2.0
 """What turning away from the present target costs, s: new plans must be better than that."""
 BETTER_S = 12.0
-"""New tours must cost so much less than the last ones with what is new put in, s of :func:`tour_cost`."""
+"""New tours must cost so much less than the last ones with what is new put in, s (as of :func:`better_tours`)."""
 SERVICE_S = 1.0
 """What looking into a region takes beyond the drive, s: braking, turning, driving off."""
 MOST_TARGETS = 40
@@ -185,10 +185,7 @@ class ReactPlus:
             start_s, between_s, at_first, on_way, value, known_m2, SHARES, WEIGHTS, price_s, left_s, first, KEEP_S
         )
         kept = insert_all(*self._begin(found, len(robots)), tasks)
-        order, cost = plan_tours(kept, tasks, WORK)
-        if all(_split(kept)) and cost > tour_cost(kept, tasks, np.empty(len(found))) - BETTER_S:
-            order = kept  # unless a robot has nothing left to do
-        tours = _split(order)
+        tours = better_tours(kept, tasks, WORK, BETTER_S)
         self.tours = [[found[k].at_m for k in tour] for tour in tours]
         for n, (robot, tour) in enumerate(zip(robots, tours, strict=True)):
             self.then[robot.id] = [found[k] for k in tour[1:STOPS]]
@@ -322,14 +319,3 @@ def _passed_m(before: tuple[float, float], robot: RobotView, point: tuple[float,
     share = 0.0 if square == 0 else ((point[0] - before[0]) * dx + (point[1] - before[1]) * dy) / square
     share = min(1.0, max(0.0, share))
     return float(np.hypot(before[0] + share * dx - point[0], before[1] + share * dy - point[1]))
-
-
-def _split(order: NDArray[np.int64]) -> list[list[int]]:
-    """Return the tours, robot by robot."""
-    tours: list[list[int]] = [[]]
-    for k in order.tolist():
-        if k < 0:
-            tours.append([])
-        else:
-            tours[-1].append(k)
-    return tours

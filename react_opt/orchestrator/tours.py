@@ -135,6 +135,39 @@ def tour_cost(order: IntArray, tasks: Tasks, unseen: FloatArray) -> float:
     return cost + 0.02 * length + 0.2 * spread / (total - known + 1e-9)
 
 
+def better_tours(kept: IntArray, tasks: Tasks, work: int, margin_s: float) -> list[list[int]]:
+    """Return each robot's targets in new tours, or in those kept where the new ones are hardly better.
+
+    Parameters
+    ----------
+    kept
+        Tours, as for :func:`tour_cost`.
+    tasks
+        What there is to visit.
+    work
+        Most evaluations in looking for new tours.
+    margin_s
+        New tours must cost so much less, s: a change of mind costs turning and braking. Where a robot has nothing to
+        do in the tours kept, new ones are taken in any case.
+    """
+    order, cost = plan_tours(kept, tasks, work)
+    last = _split(kept)
+    if all(last) and cost > tour_cost(kept, tasks, np.empty(len(tasks.value))) - margin_s:
+        return last
+    return _split(order)
+
+
+def _split(order: IntArray) -> list[list[int]]:
+    """Return the tours, robot by robot."""
+    tours: list[list[int]] = [[]]
+    for k in order.tolist():
+        if k < 0:
+            tours.append([])
+        else:
+            tours[-1].append(k)
+    return tours
+
+
 @kernel
 def plan_tours(begin: IntArray, tasks: Tasks, work: int) -> tuple[IntArray, float]:
     """Return tours and their cost, by local search from given ones: deterministic, and limited by counted work.

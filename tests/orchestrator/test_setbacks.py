@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from react_opt.orchestrator import react_plus
 from react_opt.orchestrator.belief import RobotView
 from react_opt.orchestrator.registry import make_strategy
 from react_opt.orchestrator.setbacks import STUCK_S, Setbacks
 from react_opt.orchestrator.strategy import StrategyOptions
+from react_opt.orchestrator.tours import IntArray, Tasks, better_tours
 
 from .drawn import Loop, drawn, robot_at
 
@@ -46,6 +49,33 @@ def test_a_robot_that_never_moves_does_not_keep_the_last_room_for_itself() -> No
     took_s = loop.run(300.0)
     assert loop.known_share() > 0.97
     assert took_s < 100.0
+
+
+def test_plans_expect_a_stuck_robot_late_and_do_not_send_it_where_it_gave_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robot ``b`` was stuck three times where it is, and gave up the place that it would be sent to."""
+    tasks: list[Tasks] = []
+
+    def noted(kept: IntArray, given: Tasks, work: int, margin_s: float) -> list[list[int]]:
+        tasks.append(given)
+        return better_tours(kept, given, work, margin_s)
+
+    monkeypatch.setattr(react_plus, "better_tours", noted)
+    fresh, failed = react_plus.ReactPlus(OPTIONS), react_plus.ReactPlus(OPTIONS)
+    loop = Loop(CHAMBERS, fresh, [robot_at("a", 20.0, 2.0), robot_at("b", 17.0, 2.0)])
+    fresh.decide(loop.belief)
+    goal_m = fresh.goals["b"].at_m
+    b = loop.belief.robots[1]
+    for _ in range(3):
+        failed.setbacks.stuck(b)
+    failed.setbacks.give_up(b, goal_m, 0.0)
+    failed.decide(loop.belief)
+    late_s = tasks[1].start_s - tasks[0].start_s
+    assert np.all(late_s[0] == 0.0)
+    far = tasks[1].start_s[1] == react_plus.FAR_S
+    assert far.any()
+    assert np.allclose(late_s[1, ~far], 2 * STUCK_S)
+    given = failed.goals.get("b")
+    assert given is None or given.at_m != goal_m
 
 
 def test_what_one_robot_gives_up_another_one_may_do_and_only_for_a_while() -> None:

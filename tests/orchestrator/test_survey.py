@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from react_opt.geometry.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from react_opt.orchestrator.survey import COARSE, Survey
 from react_opt.orchestrator.survey_drives import drive_times, ground_of, ways_out
-from react_opt.orchestrator.survey_kernels import count_solids
+from react_opt.orchestrator.survey_kernels import HIDDEN, OPEN, SOLID, count_solids, sight_codes
 from react_opt.orchestrator.views import count_seen
 
 from .drawn import PROFILE
@@ -123,3 +123,12 @@ def test_a_robot_that_is_closed_in_starts_from_the_nearest_place_that_leads_on()
     cells[:31, 30], cells[30, :31] = OCCUPIED, OCCUPIED
     times = survey_of(cells).times_from(1.0, 1.0, optimistic=True)
     assert np.isfinite(times[40, 50])
+
+
+def test_blocks_together_are_solid_by_half_and_hidden_by_one() -> None:
+    """Five columns in pairs: the last one is half off the map, where one solid block is not half of four."""
+    blocks = np.full((2, 5), OPEN, dtype=np.uint8)
+    blocks[0, 0] = blocks[1, 1] = SOLID
+    blocks[0, 2], blocks[1, 3] = SOLID, HIDDEN
+    blocks[1, 4] = SOLID
+    assert sight_codes(blocks, 2).tolist() == [[SOLID, HIDDEN, OPEN]]

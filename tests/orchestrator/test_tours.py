@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from react_opt.orchestrator.tours import Tasks, insert_all, plan_tours, tour_cost
+from react_opt.orchestrator.tours import Tasks, better_tours, insert_all, plan_tours, tour_cost
 
 SHARES = np.array([0.8, 0.97, 1.0])
 WEIGHTS = np.array([1.0, 2.0, 1.0])
@@ -105,3 +105,18 @@ def test_a_crumb_that_will_be_too_late_is_not_fetched_first(left_s: float) -> No
     """A large region at 20 and a crumb at -10: after the region the crumb takes until 50."""
     order, _ = planned(line([20.0, -10.0], [0.0], [60.0, 0.1], left_s))
     assert order.tolist() == [0, 1]
+
+
+def test_tours_are_kept_unless_others_are_better_by_more_than_the_margin() -> None:
+    """Beginning with the target at the far side costs some seconds more, of which the margin may be more or less."""
+    tasks = line([10.0, -12.0], [0.0], [5.0, 5.0])
+    kept, unseen = np.array([1, 0]), np.empty(2)
+    gain_s = tour_cost(kept, tasks, unseen) - tour_cost(np.array([0, 1]), tasks, unseen)
+    assert gain_s > 0.0
+    assert better_tours(kept, tasks, 1000, 0.9 * gain_s) == [[0, 1]]
+    assert better_tours(kept, tasks, 1000, 1.1 * gain_s) == [[1, 0]]
+
+
+def test_a_robot_without_work_gets_some_whatever_the_margin() -> None:
+    tasks = line([2.0, 98.0], [0.0, 100.0], [5.0, 5.0])
+    assert better_tours(np.array([0, 1, -1]), tasks, 1000, 1e6) == [[0], [1]]
