@@ -270,7 +270,9 @@ def simulate(
     if output is not None:
         require_writable(output)
     folder = Path() if mission_file == "-" else Path(mission_file).parent
-    with _named({"<data>": mission_file}), Interruption() as interruption, mission_bar(mission.horizon_s) as progress:
+    kept = "no trace is kept without -o" if output is None else "the trace so far is written and can be resumed"
+    interruption = Interruption(f"stopping the mission; {kept}")
+    with _named({"<data>": mission_file}), interruption, mission_bar(mission.horizon_s) as progress:
         trace = simulate_mission(mission, folder, resume=before, on_progress=progress, should_stop=interruption.asked)
     if output is not None:
         save(trace, output)

@@ -1,4 +1,4 @@
-"""Ctrl-C and termination as a flag that solvers poll, so that the best plan so far is kept."""
+"""Ctrl-C and termination as a flag that solvers and the simulator poll, so that what there is so far is kept."""
 
 from __future__ import annotations
 
@@ -10,9 +10,16 @@ from typing import Any, Self
 
 
 class Interruption:
-    """Context in which the first SIGINT or SIGTERM sets a flag and a second one raises ``KeyboardInterrupt``."""
+    """Context in which the first SIGINT or SIGTERM sets a flag and a second one raises ``KeyboardInterrupt``.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    next_step
+        What happens after the first one, to be told on standard error.
+    """
+
+    def __init__(self, next_step: str = "finishing with the best plan so far") -> None:
+        self._next_step = next_step
         self._asked = threading.Event()
         self._before: dict[int, Any] = {}
 
@@ -38,4 +45,4 @@ class Interruption:
         if self._asked.is_set():
             raise KeyboardInterrupt
         self._asked.set()
-        print("interrupted: finishing with the best plan so far", file=sys.stderr)
+        print(f"interrupted: {self._next_step}", file=sys.stderr)

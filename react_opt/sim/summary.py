@@ -131,6 +131,8 @@ def summarise(trace: Trace, milestones: tuple[float, ...] = MILESTONES) -> Summa
 
 def spent_j(trace: Trace, robot: int, t_s: float) -> float:
     """Return what a robot has spent by a time, J (charging does not count against it)."""
+    if not trace.frames:  # stopped before its first one
+        return 0.0
     at = np.array([frame.t_s for frame in trace.frames])
     left = np.array([frame.robots[robot].battery_j for frame in trace.frames])
     spent = np.concatenate(([0.0], np.cumsum(np.maximum(-np.diff(left), 0.0))))

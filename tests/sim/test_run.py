@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +12,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from react_opt.cli import app
+from react_opt.cli import app, main
 from react_opt.errors import ReactError, UsageError
 from react_opt.geometry import save_map
 from react_opt.instance import Mission, Noise
 from react_opt.jsonio import load, save
 from react_opt.orchestrator.strategy import Note
 from react_opt.plan import InspectionClaim, Secondary
+from react_opt.sim import run
 from react_opt.sim.loop import Simulation
 from react_opt.sim.run import simulate, with_options
 from react_opt.sim.summary import Summary, summarise
@@ -122,3 +125,28 @@ def test_a_claim_of_an_inspection_is_the_same_after_reading_the_trace_again(tmp_
     told = simulation.record.trace(finished=True, scan_s=0.25)
     save(told, tmp_path / "trace.json")
     assert load(tmp_path / "trace.json").events == told.events
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_ctrl_c_says_what_becomes_of_the_trace(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], kept: bool
+) -> None:
+    def interrupted(*arguments: Any, **options: Any) -> Trace:
+        signal.raise_signal(signal.SIGINT)
+        return simulate(*arguments, **options)
+
+    monkeypatch.setattr(run, "simulate", interrupted)
+    out = folder / "interrupted.json"
+    words = ["react-opt", "simulate", str(folder / "mission.json"), *(["-o", str(out)] if kept else [])]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 130
+    said = capsys.readouterr().err
+    assert "best plan" not in said
+    assert ("the trace so far is written and can be resumed" in said) is kept
+    assert ("no trace is kept without -o" in said) is not kept
+    if kept:
+        stopped = load(str(out), "trace")
+        assert stopped.status == "stopped"
+        assert told(simulate(MISSION, folder, resume=stopped)) == told(simulate(MISSION, folder))
