@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.readers.latency import robot
 from benchmarks.readers.text import fault, lines_of, number
-from benchmarks.readers.tsplib import robot
 
 MAX_NODES = 3000
 

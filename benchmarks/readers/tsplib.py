@@ -1,30 +1,25 @@
-"""TSPLIB files as minimum latency problems: one robot, every city a cell, the sum of arrival times as the objective.
+"""TSPLIB files as minimum latency problems: every city a cell, the sum of arrival times as the objective.
 
-A city first sensed at t earns ``T - t + 1``, so a plan that explores all n - 1 cities has the coverage
-``(n - 1) (T + 1) - latency``: the most coverage is the least latency. T is such that nothing better takes longer (see
-:func:`enough_steps`).
-The depot is the first city and weighs nothing; moving costs no energy; distances of 0 count as 1.
+One robot, or several that leave the first city together. See :mod:`benchmarks.readers.latency`.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 
+from benchmarks.readers.latency import latency_instance
 from benchmarks.readers.text import fault, lines_of, number
 
 MAX_CITIES = 3000
-MOST_IMPROVED = 60  # cities of a tour that is improved
 Distance = Callable[[float, float, float, float], int]
 
 
-def read(file: str) -> list[dict[str, Any]]:
+def read(file: str, robots: int = 1) -> list[dict[str, Any]]:
     """Return the one ``oros`` instance of a TSPLIB file (TSP or ATSP)."""
     header, sections = _parsed(file)
     n = header.get("DIMENSION", "")
@@ -32,78 +27,7 @@ def read(file: str) -> list[dict[str, Any]]:
         fault(file, "DIMENSION", f"expected a whole number from 2 to {MAX_CITIES}, found {n!r}")
     matrix, points = _distances(file, int(n), header, sections)
     name = header.get("NAME", Path(file).stem)
-    return [latency_instance(f"latency_{name}", matrix, points)]
-
-
-def latency_instance(name: str, matrix: Any, points: Any) -> dict[str, Any]:
-    """Return the minimum latency problem on a matrix of whole distances, as an ``oros`` instance."""
-    n = len(matrix)
-    steps = np.maximum(matrix, 1)
-    horizon = enough_steps(steps)
-    return {
-        "kind": "oros",
-        "schema_version": 1,
-        "name": name,
-        "horizon_steps": horizon,
-        "step_s": 1.0,
-        "cells": [
-            {"id": f"c{i}", "x_m": float(points[i][0]), "y_m": float(points[i][1]), "weight": float(i > 0)}
-            for i in range(n)
-        ],
-        "travel": [
-            {"from": f"c{i}", "to": f"c{j}", "steps": int(steps[i, j]), "energy_j": 0.0}
-            for i in range(n)
-            for j in range(n)
-            if i != j and j > 0
-        ],
-        "robots": [robot("r0", "c0")],
-    }
-
-
-def robot(name: str, start: str) -> dict[str, Any]:
-    """Return a robot whose battery plays no part."""
-    return {"id": name, "start": start, "battery_j": 0.0, "capacity_j": 0.0, "idle_w": 0.0, "sensing_w": 0.0}
-
-
-def enough_steps(steps: Any) -> int:
-    """Return a horizon that no minimum latency tour exceeds, and by which leaving out cities does not pay.
-
-    The tour of the nearest neighbours, improved by moving cities and turning stretches round, has some latency U. A
-    tour whose last arrival is after T has its k-th last arrival after T - (k - 1) d, with d the longest leg, and its
-    k-th arrival not before the distance of the k-th nearest city. Where these sum up to U or more, T is enough. A plan
-    that leaves out cities for which there is no time any more counts each as if it came at T + 1: the same sum.
-    """
-    n, longest = len(steps), int(steps.max())
-    if n < 2:
-        return 1
-    near = np.sort(dijkstra(steps, indices=0)[1:])
-    known = _good_latency(steps)
-    later = longest * np.arange(n - 2, -1, -1)
-    return bisect_left(range(known), known, lo=longest, key=lambda t: np.maximum(near, t + 1 - later).sum())
-
-
-def _good_latency(steps: Any) -> int:
-    """Return the latency of a good tour: nearest neighbours, then the best of moves and turns until there is none."""
-    left, tour = set(range(1, len(steps))), [0]
-    while left:
-        tour.append(min(left, key=lambda j: (steps[tour[-1], j], j)))
-        left.discard(tour[-1])
-
-    def latency(order: list[int]) -> int:
-        return int(np.cumsum(steps[order[:-1], order[1:]]).sum())
-
-    best, improved = latency(tour), len(tour) <= MOST_IMPROVED
-    while improved:
-        improved = False
-        for a in range(1, len(tour)):
-            for b in range(1, len(tour)):
-                moved = tour[:a] + tour[a + 1 :]
-                moved.insert(b, tour[a])
-                turned = tour[:a] + tour[a : b + 1][::-1] + tour[b + 1 :]
-                for order in (moved, turned) if a < b else (moved,):
-                    if (worth := latency(order)) < best:
-                        best, tour, improved = worth, order, True
-    return best
+    return [latency_instance(f"latency_{name}", matrix, points, robots)]
 
 
 def _parsed(file: str) -> tuple[dict[str, str], dict[str, list[tuple[int, list[str]]]]]:
