@@ -25,7 +25,7 @@ from react_opt.solvers.routes.memory import Memory, fewest_steps
 from react_opt.solvers.routes.pricing import RoutePricer
 from react_opt.solvers.routes.setcuts import separate_sets
 from react_opt.solvers.routes.setjoin import best_of_each
-from react_opt.solvers.routes.setprices import set_prices
+from react_opt.solvers.routes.setprices import coefficients_of_sets, set_prices
 from react_opt.solvers.routes.smoothing import SmoothedDual
 from react_opt.timegraph import route_problem
 
@@ -78,6 +78,7 @@ def _enumerate(instance: OrosInstance) -> None:
     look = found.look(set_prices(duals.cell, (), none), 0.0, 1000)
     best_of_each(look.sets, look.value)  # where there are threads
     pool = Pool(look.value, np.zeros(len(look.value)), np.zeros(len(look.value), np.int64), look.sets)
+    coefficients_of_sets(look.sets, ())
     separate_sets(1 - np.eye(6, dtype=np.uint8), np.full(6, 0.3), set(), 1)  # cells in common: sets grow to all sizes
     best_choice(pool, np.ones(1, np.int64), np.zeros(problem.n_cells), 1.0, 0.0, 1, pricer.stop)
 

@@ -14,16 +14,19 @@ from react_opt.solvers.routes.budget import Standing
 from react_opt.solvers.routes.choice import Pool, best_choice
 from react_opt.solvers.routes.columns import Duals, Rank1Cut
 from react_opt.solvers.routes.cuts import SubsetRow
-from react_opt.solvers.routes.enumeration import Enumeration, enumerate_routes
+from react_opt.solvers.routes.enumeration import Enumeration, Look, enumerate_routes
 from react_opt.solvers.routes.generation import Generation, Multipliers
 from react_opt.solvers.routes.pool import CUTS_AT_ONCE, TINY, WORTH_IT, PoolPrices, PoolProgram
 from react_opt.solvers.routes.setcuts import SetCut, separate_sets
-from react_opt.solvers.routes.setprices import set_prices
+from react_opt.solvers.routes.setjoin import best_of_each
+from react_opt.solvers.routes.setprices import cost_of_sets, set_prices
 
 EASIER = 0.85  # share of the last hopeless gap at which it is tried again
-LEAST, MOST = 400_000, 6_000_000  # labels of each direction; in between twice as many as labels priced so far
-MOST_ROUTES = 300_000  # in the linear programme
-PATIENCE = 5  # looks at all routes that may fail to lower the bound by so much of the gap
+LEAST, MOST = 400_000, 12_000_000  # labels of each direction; in between four times as many as labels priced so far
+MOST_ROUTES = 1_500_000  # that are listed if these are all; otherwise the best ones, and as many others
+SOME_ROUTES = 250_000
+AHEAD = 0.6  # of the way from the best prices to those of the list
+PATIENCE = 8  # looks at all routes that may fail to lower the bound by so much of the gap
 FIRST_WORK, MOST_WORK = 400_000_000, 2_000_000_000  # looks at routes when choosing among them: one second, or some
 SHORTER = 0.7  # share of the list of the last choice that was given up at which it is tried again
 
@@ -87,7 +90,7 @@ class Finish:
             return None
         pricer, floor = self.generation.pricer, standing.objective
         words = -(-pricer.problem.n_cells // 64)
-        most = min(MOST, max(LEAST, 2 * pricer.labels)) // max(1, words // 2)  # sets of many cells are large
+        most = min(MOST, max(LEAST, 4 * pricer.labels)) // max(1, words // 2)  # sets of many cells are large
         duals = self.generation.extended(best)
         found: list[Enumeration] = []
         for group in range(len(master.counts)):
@@ -138,7 +141,7 @@ class Finish:
         if not whole:
             best, whole = self._complete(program, found)
             if not whole:
-                return Finished(best.bound, (best,)), False
+                return Finished(best.bound, tuple(program.stages)), False
             worth, going = self._best_of(program.pool, best, must, FIRST_WORK, found)
             if not going:
                 return Finished(worth, tuple(program.stages)), True
@@ -160,26 +163,34 @@ class Finish:
     def _complete(self, program: PoolProgram, found: list[Enumeration]) -> tuple[PoolPrices, bool]:
         """Go on with prices over a part of the routes until no route is missing at these.
 
+        The list grows by what is worth most at prices on the way from the best ones to those of the list, and by
+        others drawn at random: few routes that are not drawn can lie above prices that suit those drawn (Clarkson
+        1995). Where the bound did not fall there, the next prices are nearer to the best ones (Ben-Ameur, Neto 2007).
         Return the prices of the smallest bound over all routes, and whether it came to that.
         """
-        best, rounds, failed = program.prices, 1, 0
+        best, ahead, failed = program.prices, AHEAD, 0
+        program.stages.append(best)
         while failed < PATIENCE and not self.standing.budget.over():
-            for _ in range(rounds):
-                if not program.tighten():
-                    break
-            expected = program.prices.bound
-            listed = self._look(found, program.prices, program.prices.group - self._gap(best))
+            program.tighten()
+            here = _between(best, program.prices, ahead)
+            listed = self._look(found, here, here.group - self._gap(best), best)
             if listed is None:
                 break
             pool, prices, whole = listed
-            # where the part stood for all routes it may do so a little longer
-            rounds = 2 if prices.bound <= expected + TINY else 1
-            failed = 0 if best.bound - prices.bound > WORTH_IT * self._gap(best) else failed + 1
-            best = min(best, prices, key=lambda one: one.bound)
-            program.renew(pool, prices, whole=whole)
             if whole:
+                program.renew(pool, prices, whole=True)
                 self.routes += len(pool.value)
                 return prices, True
+            failed = 0 if best.bound - prices.bound > WORTH_IT * self._gap(best) else failed + 1
+            if prices.bound < best.bound:
+                best, ahead = prices, AHEAD
+                program.stages.append(best)
+                form, gap = set_prices(best.cell, best.cuts, best.price), self._gap(best)
+                for one, worth in zip(found, best.group.tolist(), strict=True):
+                    one.narrow(form, worth - gap)
+            else:
+                ahead /= 2.0
+            program.renew(_united(program.pool, pool), best, whole=False)
         return best, False
 
     def _gap(self, prices: PoolPrices) -> float:
@@ -187,7 +198,9 @@ class Finish:
         floor = -np.inf if self.standing.objective is None else self.standing.objective
         return prices.bound - floor + 1e-7 * max(1.0, abs(prices.bound))
 
-    def _look(self, found: list[Enumeration], prices: PoolPrices, least: FloatArray) -> _Listed | None:
+    def _look(
+        self, found: list[Enumeration], prices: PoolPrices, least: FloatArray, known: PoolPrices | None = None
+    ) -> _Listed | None:
         """Return the routes that lose least at some prices; None if it was interrupted.
 
         Parameters
@@ -198,14 +211,17 @@ class Finish:
             The prices; ``bound`` and ``group`` are of no consequence.
         least
             ``(n_classes,)`` value minus prices from which on routes are of interest.
+        known
+            Prices with a proven bound: routes that lose more at these than a better plan can are left out.
         """
         form = set_prices(prices.cell, prices.cuts, prices.price)
         with self.standing.budget.alone():
-            looks = [
-                one.look(form, float(worth), MOST_ROUTES // len(found)) for one, worth in zip(found, least, strict=True)
-            ]
+            most, some = MOST_ROUTES // len(found), SOME_ROUTES // len(found)
+            looks = [one.look(form, float(worth), most, some) for one, worth in zip(found, least, strict=True)]
         if any(look.whole_above == np.inf for look in looks):
             return None
+        if known is not None:
+            looks = [self._within(look, known, k) for k, look in enumerate(looks)]
         best = np.array([look.reduced.max(initial=worth) for look, worth in zip(looks, least.tolist(), strict=True)])
         counts = np.array(self.generation.master.counts, dtype=np.float64)
         rhs = np.array([cut.rhs for cut in prices.cuts])
@@ -220,6 +236,12 @@ class Finish:
         order = np.argsort(loss, kind="stable")
         order = order[loss[order] <= gap]
         return _Listed(Pool(value[order], loss[order], group[order], sets[order]), prices, whole)
+
+    def _within(self, look: Look, known: PoolPrices, group: int) -> Look:
+        """Return a look without the routes of a class that lose more at some prices than those of a better plan."""
+        reduced = look.value - cost_of_sets(look.sets, set_prices(known.cell, known.cuts, known.price), self.threads)
+        kept = known.group[group] - reduced <= self._gap(known)
+        return look._replace(sets=look.sets[kept], value=look.value[kept], reduced=look.reduced[kept])
 
     def _violated(self, known: set[SetCut]) -> list[SetCut]:
         """Return cuts over sets that the last point of column generation violates: the first of the programme."""
@@ -272,3 +294,21 @@ def _set_prices(duals: Duals, cuts: Sequence[Rank1Cut]) -> PoolPrices:
             whole = SetCut(tuple(sorted(cut.cells)), (1, 1, 1), 2)
             price[whole] = price.get(whole, 0.0) + worth
     return PoolPrices(np.inf, duals.cell, duals.group, tuple(price), np.array(list(price.values())))
+
+
+def _united(one: Pool, other: Pool) -> Pool:
+    """Return the routes of both lists, the best one for each class and set; what they lose is left open."""
+    value, group = np.concatenate((one.value, other.value)), np.concatenate((one.group, other.group))
+    sets = np.concatenate((one.sets, other.sets))
+    kept = best_of_each(np.column_stack((sets, group.astype(np.uint64))), value)
+    return Pool(value[kept], np.zeros(len(kept)), group[kept], sets[kept])
+
+
+def _between(one: PoolPrices, other: PoolPrices, share: float) -> PoolPrices:
+    """Return the prices at some share of the way from ``one`` to ``other``; the bound is not known."""
+    price: dict[SetCut, float] = {}
+    for prices, weight in ((one, 1.0 - share), (other, share)):
+        for cut, worth in zip(prices.cuts, prices.price.tolist(), strict=True):
+            price[cut] = price.get(cut, 0.0) + weight * worth
+    cell, group = ((1.0 - share) * old + share * new for old, new in ((one.cell, other.cell), (one.group, other.group)))
+    return PoolPrices(np.inf, cell, group, tuple(price), np.array(list(price.values())))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from react_opt.route_problem import FloatArray, IntArray
 from react_opt.solvers.routes.budget import Standing
@@ -21,11 +22,12 @@ from react_opt.solvers.routes.labelstore import MaskArray
 from react_opt.solvers.routes.master import Master, MasterPoint
 from react_opt.solvers.routes.region import everything
 from react_opt.solvers.routes.setcuts import Bits, SetCut, separate_sets
-from react_opt.solvers.routes.setprices import cost_of_sets, set_prices
+from react_opt.solvers.routes.setprices import coefficients_of_sets, cost_of_sets, set_prices
 
-FIRST_COLUMNS, COLUMNS = 400, 160
+FIRST_COLUMNS, COLUMNS = 400, 320
 MOST_COLUMNS = 6000  # then half of them are dropped
 ACTIVE = 20_000  # routes that are priced each time; all others only when these do not help any more
+OTHERS = 10_000  # routes that are priced besides, from all over the list: without them prices go astray
 SMOOTHING = 0.6
 EARLY = 0.03  # part of what the programme lies above the incumbent
 MOST_CUTS, CUTS_AT_ONCE = 200, 40
@@ -89,34 +91,43 @@ class PoolProgram:
     ) -> None:
         n = len(first.cell)
         self.pool, self.must, self._standing, self._whole = pool, must, standing, whole
-        self._counts = np.array(counts, dtype=np.int64)
+        self._counts, self._threads = np.array(counts, dtype=np.int64), threads
         self._master = Master(n, counts, 2.0 * float(np.abs(pool.value).max()) * (1 + sum(counts)) + 1.0, threads)
         self._master.restrict(replace(everything(len(counts), n, 0), must=must))
         self._add(np.arange(min(FIRST_COLUMNS, len(pool.value))))
         self._master.add_cuts(first.cuts)
         self._active = self._first()
         self._stalled = 0
+        self._rows: tuple[IntArray, tuple[SetCut, ...], csr_array] | None = None
         self.prices = first
         self.stages = [first] if whole else []  # prices at which routes were dropped, or were not listed
         self._look(first.cell, first.price, np.inf)
 
     def renew(self, pool: Pool, prices: PoolPrices, *, whole: bool) -> None:
-        """Go on with another list: what was worth most at the last prices among all routes.
+        """Go on with another list.
 
         Parameters
         ----------
         pool
-            The routes, with what they lose at these prices.
+            The routes, with what they lose at these prices if ``whole``.
         prices
-            The prices, with the bound and the most that a route of each class is worth among all.
+            Prices with a bound that holds whatever routes are missing, and the most that a route of each class is worth
+            among all. They are what new prices are pulled towards.
         whole
             Whether no route is missing that a plan better than the incumbent can contain.
         """
         self.pool, self.prices, self._whole, self._stalled = pool, prices, whole, 0
-        self._active = self._first()
         if whole:
             self.stages.append(prices)
+            self._active = self._first()
             self._forget(self._most_lost())
+        else:
+            # other routes lose too much to be part of a better plan
+            loss = prices.group[pool.group] - self._look(*self._extended(), np.inf)
+            order = np.argsort(loss, kind="stable")
+            order = order[loss[order] <= self._most_lost()]
+            self.pool = Pool(pool.value[order], loss[order], pool.group[order], pool.sets[order])
+            self._active = self._first()
 
     @property
     def cuts(self) -> tuple[SetCut, ...]:
@@ -188,8 +199,6 @@ class PoolProgram:
             self._standing.budget.spend()
             if point is None:
                 return None
-            if len(self._master.columns) > MOST_COLUMNS:
-                self._master.keep_best(point, MOST_COLUMNS // 2)
             cell = smoothing * centre_cell + (1.0 - smoothing) * point.duals.cell
             cut = smoothing * centre_cut + (1.0 - smoothing) * point.duals.cut
             if whole:
@@ -215,6 +224,8 @@ class PoolProgram:
                 smoothing = 0.0
             else:
                 smoothing = SMOOTHING
+            if len(self._master.columns) > MOST_COLUMNS:  # the point is of no use afterwards
+                self._master.keep_best(point, MOST_COLUMNS // 2)
         return None
 
     def _look(self, cell: FloatArray, cut: FloatArray, known: float) -> FloatArray:
@@ -236,11 +247,16 @@ class PoolProgram:
 
     def _reduced(self, cell: FloatArray, cut: FloatArray, active: IntArray | None = None) -> FloatArray:
         """Return value minus prices of some routes, all by default."""
-        value, sets = self.pool.value, self.pool.sets
-        if active is not None and len(active) < len(value):
-            value, sets = value[active], sets[active]
-        reduced: FloatArray = value - cost_of_sets(sets, set_prices(cell, self.cuts, cut))
-        return reduced
+        if active is None or len(active) == len(self.pool.value):
+            form = set_prices(cell, self.cuts, cut)
+            reduced: FloatArray = self.pool.value - cost_of_sets(self.pool.sets, form, self._threads)
+            return reduced
+        if self._rows is None or self._rows[0] is not active or self._rows[1] != self.cuts:
+            sets = self.pool.sets[active]
+            rows = np.hstack((inside_of(sets, len(cell)), coefficients_of_sets(sets, self.cuts)))
+            self._rows = active, self.cuts, csr_array(rows, dtype=np.float64)
+        some: FloatArray = self.pool.value[active] - self._rows[2] @ np.concatenate((cell, cut))
+        return some
 
     def loss(self) -> FloatArray:
         """Return what each route loses at the best prices."""
@@ -254,9 +270,11 @@ class PoolProgram:
         return self.prices.cell, np.array([price.get(cut, 0.0) for cut in self.cuts])
 
     def _first(self) -> IntArray:
-        """Return the routes that lose least, and at least one of each class."""
+        """Return the routes that lose least, at least one of each class, and some of all the others."""
+        size = len(self.pool.group)
         best = np.unique(self.pool.group, return_index=True)[1]
-        return np.union1d(best, np.arange(min(ACTIVE, len(self.pool.group))))
+        others = np.linspace(0, max(0, size - 1), min(size, OTHERS)).astype(np.int64)
+        return np.unique(np.concatenate((np.arange(min(ACTIVE, size)), best, others)))
 
     def _add(self, routes: IntArray) -> int:
         """Add routes to the master; return how many are new."""
