@@ -166,6 +166,10 @@ def main(arguments: list[str] | None = None) -> int:
         "-o", "--output", type=Path, metavar="FOLDER", help="write the instances here and solve nothing"
     )
     options = parser.parse_args(arguments)
+    if not options.limit_s >= 0.0:
+        parser.error(f"--limit-s: expected a number of seconds >= 0, found {options.limit_s}")
+    if options.threads < 1:
+        parser.error(f"--threads: expected a whole number >= 1, found {options.threads}")
     rows = [row for row in TABLE if row.name in options.problems]
     if options.output is not None:
         options.output.mkdir(parents=True, exist_ok=True)

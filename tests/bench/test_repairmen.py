@@ -200,3 +200,14 @@ def test_a_row_of_the_table_is_printed(capsys: Any) -> None:
     assert words[:2] == ["10x4-1", "5"]
     assert words[4:6] == ["545.69071", "545.69071"]
     assert (words[7], words[10:]) == ("optimal", ["fit", "ok"])
+
+
+@pytest.mark.parametrize(("option", "value"), [("--limit-s", "-1"), ("--limit-s", "nan"), ("--threads", "0")])
+def test_a_limit_that_is_none_is_refused_before_anything_is_solved(
+    option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2 and one line that names the option, as for every wrong argument."""
+    with pytest.raises(SystemExit) as left:
+        main([option, value])
+    assert left.value.code == 2
+    assert f"error: {option}: expected" in capsys.readouterr().err
